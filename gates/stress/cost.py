@@ -33,6 +33,8 @@ from genpolicy.statistics.clustered import ratio_interval
 
 STOPS = ("collision", "force_stop")
 """Outcomes (`genpolicy.evidence.stress.state`) that stay until a person resets the cell."""
+INVOKED = "invocations"
+"""The column of rollouts that counts them."""
 TOO_OLD = "beyond the maximum action age"
 """Said of a first answer that comes when nothing of it may be executed any more."""
 
@@ -45,7 +47,7 @@ TOO_OLD = "beyond the maximum action age"
 )
 def deadline_miss_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of invocations that miss their deadline."""
-    found = _share_of(evidence, settings, candidate, "deadline_misses", "invocations")
+    found = _share_of(evidence, settings, candidate, "deadline_misses", INVOKED)
     said = _faults(evidence, candidate)
     return replace(found, caveat=f"{found.caveat}; {said}") if said else found
 
@@ -85,7 +87,7 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     rolled = rollouts(evidence, settings, candidate)
     stated = zip(
         zip(*(rolled[name] for name in keys), strict=True),
-        numbers(rolled, "invocations"),
+        numbers(rolled, INVOKED),
         strict=True,
     )
     if any(recorded.get(key, 0) != count for key, count in stated):
@@ -93,6 +95,8 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     cold = numbers(rows, "invocation") == 0
 
     def measure(part: pd.DataFrame, condition: str) -> Interval:
+        if len(part) == 0:
+            raise MissingEvidenceError(f"no warm invocation in {condition}: no answer to be timed")
         point, ends = upper_quantile(
             numbers(part, "latency_s"),
             part["start"].to_numpy(),
@@ -104,11 +108,21 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
 
     found = in_every_condition(rows[~cold], settings.perturbations, measure)
     text = f"{found.caveat}; {_cold(float(latency[cold].max(initial=0.0)), settings.oldest_s)}"
+    for condition in settings.perturbations:
+        if said := _uninvoked(rolled, condition):
+            text = f"{text}; {said}"
     # Missing where nothing that was compared has a teacher.
     if evidence.bind(f"{STRESS}/{DISTILLED.file}"):
-        said = evidence.document(STRESS, DISTILLED).get(candidate)
-        text = f"{text}; {spent(said)}" if said else text
+        training = evidence.document(STRESS, DISTILLED).get(candidate)
+        text = f"{text}; {spent(training)}" if training else text
     return replace(found, caveat=text)
+
+
+def _uninvoked(rows: pd.DataFrame, condition: str) -> str:
+    """How many rollouts of a condition began no invocation, as without any picture; or empty."""
+    part = rows[rows["perturbation"] == condition]
+    none = int((numbers(part, INVOKED) == 0).sum())
+    return f"{none} of {len(part)} rollouts in {condition} without any invocation" if none else ""
 
 
 def _cold(longest_s: float, oldest_s: float) -> str:
@@ -136,7 +150,7 @@ def hold_share_upper(evidence: Evidence, settings: StressSettings, candidate: st
 )
 def rejection_share_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of invocations of which no candidate passes."""
-    return _share_of(evidence, settings, candidate, "rejections", "invocations")
+    return _share_of(evidence, settings, candidate, "rejections", INVOKED)
 
 
 @criterion(
@@ -163,6 +177,8 @@ def _share_of(  # noqa: PLR0917
 
     def measure(rows: pd.DataFrame, condition: str) -> Interval:
         hits, all_of = numbers(rows, part), numbers(rows, whole)
+        if whole == INVOKED and np.any(all_of == 0):
+            raise MissingEvidenceError(f"{_uninvoked(rows, condition)}: a share of none is unknown")
         if np.any(all_of <= 0) or np.any(hits > all_of) or np.any(hits < 0):
             raise MissingEvidenceError(f"{part} is no part of {whole}")
         sums = rows.assign(hits=hits, all_of=all_of).groupby("start")[["hits", "all_of"]].sum()

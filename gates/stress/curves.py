@@ -13,16 +13,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from gates.bounds import share_interval
-from gates.evidence import Evidence, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import CURVES, NOMINAL, ROLLOUTS
-from genpolicy.evidence.rows.stress import RolloutRow, SeverityRow
+from genpolicy.evidence.rows.stress import NEUTRAL, RolloutRow, SeverityRow
 from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]
 
 REDRAWS = 2000
-NEUTRAL = {"factor": 1.0}
-"""What a field is where nothing is injected; 0 where it is not named."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,9 @@ def curves(
         methods: Who is shown.
         confidence: Coverage of every interval.
         root_seed: Root of the streams that starts are drawn again from.
+
+    Raises:
+        MissingEvidenceError: A field whose size without any injection is not known.
     """
     sizes = evidence.rows(CURVES, SeverityRow)
     rows = evidence.rows(ROLLOUTS, RolloutRow)
@@ -83,7 +84,9 @@ def curves(
     found = []
     for condition, planned in sizes.groupby("of", sort=True):
         field = str(planned["field"].iloc[0])
-        severities = [NEUTRAL.get(field, 0.0), *map(float, numbers(planned, "severity"))]
+        if field not in NEUTRAL:
+            raise MissingEvidenceError(f"of {condition}.{field} nobody knows which size is none")
+        severities = [NEUTRAL[field], *map(float, numbers(planned, "severity"))]
         names = [NOMINAL, *map(str, planned["perturbation"])]
         for method in methods:
             own = rows[rows["method"] == method]

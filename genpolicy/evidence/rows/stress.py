@@ -262,6 +262,10 @@ class FaultRow:
     count: int
 
 
+NEUTRAL = {"magnitude_s": 0.0, "probability": 0.0, "factor": 1.0, "force_n": 0.0}
+"""Fields that a curve may be drawn over, and their size where nothing is injected: nominal."""
+
+
 @dataclass(frozen=True)
 class SeverityRow:
     """`severities.parquet` of stress: a size of a condition that a curve is drawn over.

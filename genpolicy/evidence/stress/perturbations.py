@@ -7,7 +7,7 @@ the fields that this kind has and no other.
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -44,7 +44,10 @@ class ByLot(Settings):
     Attributes:
         probability: Share that it hits. None, and no size of nothing, is refused: a condition in
             which nothing happens would pass as one that was met.
+        graded: Fields whose sizes, down to a neutral one, lead from nominal to this condition.
     """
+
+    graded: ClassVar[tuple[str, ...]] = ("probability",)
 
     probability: float = Field(default=1.0, gt=0.0, le=1.0)
 
@@ -70,6 +73,7 @@ class CameraDelay(ExposurePerturbation):
 
     kind: Literal["camera_delay"] = "camera_delay"
     magnitude_s: float = Field(gt=0.0)
+    graded: ClassVar[tuple[str, ...]] = ("magnitude_s", "probability")
 
     def hit(self, lot: float) -> Injection:
         """Always the whole delay."""
@@ -77,9 +81,15 @@ class CameraDelay(ExposurePerturbation):
 
 
 class FrameDrop(ExposurePerturbation):
-    """A picture is lost; the next invocation waits for a later one."""
+    """A picture is lost; the next invocation waits for a later one.
+
+    Attributes:
+        probability: Share that is lost; stated, and never all: without any picture no invocation
+            begins, and there is nothing to look at.
+    """
 
     kind: Literal["frame_drop"] = "frame_drop"
+    probability: float = Field(gt=0.0, lt=1.0)
 
     def hit(self, lot: float) -> Injection:
         """The picture is lost."""
@@ -91,6 +101,7 @@ class PolicyStall(InvocationPerturbation):
 
     kind: Literal["policy_stall"] = "policy_stall"
     magnitude_s: float = Field(gt=0.0)
+    graded: ClassVar[tuple[str, ...]] = ("magnitude_s", "probability")
 
     def hit(self, lot: float) -> Injection:
         """Always the whole time."""
@@ -102,6 +113,7 @@ class ComputeContention(InvocationPerturbation):
 
     kind: Literal["compute_contention"] = "compute_contention"
     factor: float = Field(gt=1.0)
+    graded: ClassVar[tuple[str, ...]] = ("factor", "probability")
 
     def hit(self, lot: float) -> Injection:
         """Always the whole factor."""
@@ -113,6 +125,7 @@ class NetworkJitter(InvocationPerturbation):
 
     kind: Literal["network_jitter"] = "network_jitter"
     magnitude_s: float = Field(gt=0.0)
+    graded: ClassVar[tuple[str, ...]] = ("magnitude_s", "probability")
 
     def hit(self, lot: float) -> Injection:
         """A share of the magnitude."""
@@ -124,6 +137,7 @@ class QueueReorder(InvocationPerturbation):
 
     kind: Literal["queue_reorder"] = "queue_reorder"
     magnitude_s: float = Field(gt=0.0)
+    graded: ClassVar[tuple[str, ...]] = ("magnitude_s", "probability")
 
     def hit(self, lot: float) -> Injection:
         """Always the whole wait."""
@@ -202,6 +216,16 @@ Perturbation = Annotated[
     | ReducedEnvelope,
     Field(discriminator="kind"),
 ]
+
+
+def gradable(perturbation: Perturbation | None) -> tuple[str, ...]:
+    """Fields of a condition that a curve may be drawn over: at a neutral size it is nominal.
+
+    A push in the open is one only where none in contact stays when it is gone.
+    """
+    if isinstance(perturbation, SidewaysPush) and perturbation.contact_force_n == 0.0:
+        return ("force_n",)
+    return perturbation.graded if isinstance(perturbation, ByLot) else ()
 
 
 def injection(

@@ -9,7 +9,7 @@ from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.rows.stress import SeverityRow
 from genpolicy.evidence.stress.person import PersonSettings
-from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
+from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope, gradable
 
 GRADED = "@"
 """Between a condition and a size of it that is run for a curve, in the name of that."""
@@ -97,9 +97,12 @@ class StressSettings(Settings):
     @model_validator(mode="after")
     def _grades_of_what_is_planned(self) -> "StressSettings":
         for name, grades in self.severities.items():
-            own = getattr(self.perturbations.get(name), grades.field, None)
-            if not isinstance(own, float):
-                raise ValueError(f"`{name}.{grades.field}` is no number of a planned condition")
+            planned = self.perturbations.get(name)
+            if grades.field not in gradable(planned):
+                raise ValueError(
+                    f"`{name}.{grades.field}` is no size of a planned condition that can be graded"
+                )
+            own = getattr(planned, grades.field)
             if own not in grades.values:
                 raise ValueError(f"the judged size {own:g} of `{name}` is not among the sizes")
         names = [*self.perturbations]

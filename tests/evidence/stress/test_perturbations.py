@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+from genpolicy.evidence.rows.stress import NEUTRAL
 from genpolicy.evidence.stress.perturbations import (
     ChunkDrop,
     Injection,
@@ -12,6 +13,7 @@ from genpolicy.evidence.stress.perturbations import (
     RecoveryDrill,
     SidewaysPush,
     drill_s,
+    gradable,
     injection,
     pushes,
     sensing,
@@ -142,3 +144,37 @@ def test_nobody_else_pushes():
 def test_bad_settings_are_refused(bad):
     with pytest.raises(ValidationError):
         parsed(bad)
+
+
+def test_all_pictures_are_not_lost_and_nobody_loses_them_by_default():
+    """Without any picture no invocation ever begins."""
+    for entry in ({}, {"probability": 1.0}, {"probability": 0.0}):
+        with pytest.raises(ValidationError):
+            parsed({"kind": "frame_drop", **entry})
+    assert parsed({"kind": "frame_drop", "probability": 0.99}).probability == 0.99
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("frame_drop", {"probability"}), ("chunk_drop", {"probability"}),
+        *((kind, {"magnitude_s", "probability"})
+          for kind in ("camera_delay", "policy_stall", "network_jitter", "queue_reorder")),
+        ("compute_contention", {"factor", "probability"}),
+    ],
+)  # fmt: skip
+def test_what_can_be_graded_is_nothing_at_its_neutral_size(kind, fields):
+    sizes = {"magnitude_s": 0.08, "factor": 2.0} if kind != "frame_drop" else {}
+    sizes = {name: size for name, size in sizes.items() if name in fields}
+    item = parsed({"kind": kind, "probability": 0.5, **sizes})
+    assert set(gradable(item)) == fields
+    for field in fields - {"probability"}:
+        hit = item.model_copy(update={field: NEUTRAL[field]}).hit(0.7)
+        assert not any(hit.extra_s.values()) and hit.compute_factor == 1.0 and not hit.dropped
+    assert NEUTRAL["probability"] == 0.0
+
+
+def test_a_push_can_be_graded_only_where_nothing_of_it_stays():
+    assert gradable(SidewaysPush(force_n=15.0)) == ("force_n",) and NEUTRAL["force_n"] == 0.0
+    assert gradable(SidewaysPush(force_n=15.0, contact_force_n=30.0)) == ()
+    assert gradable(Nominal()) == gradable(RecoveryDrill()) == gradable(None) == ()

@@ -42,7 +42,11 @@ def test_the_ladder_s_own_section_fits(kit):
     assert StressSettings(**kit.PARAMS["stress"]).starts >= 1
 
 
-LATE = {"camera_delay": {"probability": 1.0, "magnitude_s": 0.08}}
+LATE = {
+    "camera_delay": {"probability": 1.0, "magnitude_s": 0.08},
+    "envelope": {"workspace_lower_m": [0.0] * 3, "workspace_upper_m": [1.0] * 3,
+                 "speed_limit_m_s": 0.4},
+}  # fmt: skip
 
 
 def graded(**grades):
@@ -52,10 +56,11 @@ def graded(**grades):
 
 def test_a_graded_condition_is_run_and_the_planned_one_stays_the_judged_one():
     settings = graded(camera_delay={"field": "magnitude_s", "values": [0.04, 0.08, 0.16]})
-    assert list(settings.perturbations) == ["nominal", "camera_delay"]
+    assert list(settings.perturbations) == ["nominal", "camera_delay", "envelope"]
     found = {name: one.model_dump().get("magnitude_s") for name, one in settings.conditions.items()}
     assert found == {
-        "nominal": None, "camera_delay": 0.08, "camera_delay@0.04": 0.04, "camera_delay@0.16": 0.16,
+        "nominal": None, "camera_delay": 0.08, "envelope": None, "camera_delay@0.04": 0.04,
+        "camera_delay@0.16": 0.16,
     }  # fmt: skip
     assert [tuple(vars(row).values()) for row in settings.severity_rows] == [
         ("camera_delay@0.04", "camera_delay", "magnitude_s", 0.04),
@@ -75,9 +80,10 @@ def test_a_graded_condition_is_run_and_the_planned_one_stays_the_judged_one():
         ("camera_delay", "magnitude_s", [0.08, 0.08], "rise"),
         ("camera_delay", "magnitude_s", [0.0, 0.08], "greater than 0"),
         ("camera_delay", "probability", [1.0, 1.5], "less than or equal to 1"),
-        ("camera_delay", "force_n", [0.04, 0.08], "no number of a planned condition"),
-        ("camera_delay", "kind", [0.04, 0.08], "no number of a planned condition"),
-        ("push", "force_n", [5.0, 15.0], "no number of a planned condition"),
+        ("camera_delay", "force_n", [0.04, 0.08], "no size of a planned condition"),
+        ("camera_delay", "kind", [0.04, 0.08], "no size of a planned condition"),
+        ("push", "force_n", [5.0, 15.0], "no size of a planned condition"),
+        ("envelope", "speed_limit_m_s", [0.2, 0.4], "no size of a planned condition"),
         ("camera_delay", "magnitude_s", [0.08, 0.16, 0.160000001], "unique"),
     ],
 )

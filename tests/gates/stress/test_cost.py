@@ -248,7 +248,24 @@ def test_a_rollout_that_asked_nothing_has_nothing_recorded(ladder):
     before = flow(ladder, cost.latency_p95_s).value
     evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~none(f)])
     evidence.edit_table(ladder, ROLLOUTS, cells("invocations", 0, where=none))
-    assert flow(ladder, cost.latency_p95_s).value == before
+    found = flow(ladder, cost.latency_p95_s)
+    assert found.value == before
+    assert f"1 of {N} rollouts in nominal without any invocation" in found.caveat
+
+
+def test_of_no_invocation_no_share_is_known_and_no_answer_is_timed(ladder):
+    """Every picture is lost in one condition: counted and without a verdict, and no crash."""
+    none = in_("camera_delay")
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~none(f)])
+    for column in ("invocations", "deadline_misses", "rejections"):
+        evidence.edit_table(ladder, ROLLOUTS, cells(column, 0, where=none))
+    said = f"{N} of {N} rollouts in camera_delay without any invocation"
+    for share in (cost.deadline_miss_upper, cost.rejection_share_upper):
+        with pytest.raises(MissingEvidenceError, match=said):
+            flow(ladder, share)
+    with pytest.raises(MissingEvidenceError, match="no warm invocation in camera_delay"):
+        flow(ladder, cost.latency_p95_s)
+    assert judge(ladder, "D").candidates["flow"] == "INCONCLUSIVE"
 
 
 def test_without_a_cold_answer_none_is_said_to_be_slow(ladder):

@@ -6,7 +6,7 @@ import evidence
 import numpy as np
 import pytest
 
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.figures import draw_all
 from gates.pages.page import gate_page
 from gates.pages.tables_severity import CURVE, HALF
@@ -74,6 +74,16 @@ def test_a_curve_has_nominal_and_every_size(ladder):
     assert 0.08 < half < 0.16 and low <= half <= high
     assert curves(Evidence(ladder), ["flow"], confidence=0.95, root_seed=3) == found
     assert curves(Evidence(ladder), ["nobody"], confidence=0.95, root_seed=3) == []
+
+
+def test_a_field_of_which_nobody_knows_what_is_none_has_no_curve(ladder):
+    sizes = [
+        {"perturbation": name, "of": "camera_delay", "field": "speed_limit_m_s", "severity": size}
+        for name, size in (("camera_delay", 0.08), ("camera_delay@0.16", 0.16))
+    ]
+    evidence.table(ladder, CURVES.removeprefix("artifacts/"), SeverityRow, sizes)
+    with pytest.raises(MissingEvidenceError, match="which size is none"):
+        curves(Evidence(ladder), ["flow"], confidence=0.95, root_seed=3)
 
 
 def test_beyond_what_was_run(ladder):
