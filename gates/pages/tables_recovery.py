@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from gates.evidence import Evidence, counts, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.report import GateReport, parse_section, report_path
@@ -94,11 +94,20 @@ def _covered(evidence: Evidence, report: GateReport) -> Table:
     require_bound(evidence, report, RECOVERIES)
     require_bound(evidence, report, ROLLOUTS)
     settings = _settings(report)
+    heads = (
+        "candidate", "simpler method", "condition", "starts", "covered", "by the other",
+        "difference", "interval", "both recovered on, starts", "difference there",
+    )  # fmt: skip
     lines = []
     for condition in (name for name in PERTURBED if name in settings.perturbations):
         for candidate in settings.candidates:
             for baseline in settings.baselines:
-                found = coverage(evidence, settings, candidate, baseline, condition)
+                try:
+                    found = coverage(evidence, settings, candidate, baseline, condition)
+                except MissingEvidenceError as missing:
+                    none = ("",) * (len(heads) - 4)
+                    lines.append((candidate, baseline, condition, str(missing), *none))
+                    continue
                 low, high = found.interval
                 both = "" if found.gain_of_both is None else f"{found.gain_of_both:+.3g}"
                 lines.append((
@@ -106,10 +115,6 @@ def _covered(evidence: Evidence, report: GateReport) -> Table:
                     f"{found.other:.3g}", f"{found.gain:+.3g}", f"{low:+.3g} to {high:+.3g}",
                     f"{found.both}", both or "never both",
                 ))  # fmt: skip
-    heads = (
-        "candidate", "simpler method", "condition", "starts", "covered", "by the other",
-        "difference", "interval", "both recovered on, starts", "difference there",
-    )  # fmt: skip
     return (heads, *lines)
 
 
@@ -117,9 +122,9 @@ LISTINGS = (
     Listing(
         "Recovery by phase and cause",
         "Entries into recovery, by the task phase in which they began and by what began them, over "
-        "all planned conditions. An entry is recovered where its own primitive moved the arm to "
-        "its goal, the policy took over and the rollout succeeded, and no later recovery of it "
-        "began in the same phase. One that handed back and had commanded nothing but the pose "
+        "all planned conditions. An entry is recovered where its own primitive commanded the "
+        "arm to its goal, the policy took over and the rollout succeeded, and no later recovery of "
+        "it began in the same phase. One that handed back and had commanded nothing but the pose "
         "that was held left all help to new samples: it counts as not recovered. The interval is "
         "exact, over starts. Time and force: median, and the 95th percentile in brackets, from "
         "the begin of the entry to its end. Derived again from the journals by genpolicy verify "
@@ -136,7 +141,8 @@ LISTINGS = (
         "recovery, if it needed one, was one by the rule above. The interval holds the differences "
         "that the pairs do not speak against, at the confidence of this gate. Behind it the starts "
         "on which both entered recovery, and the difference on these alone: who needs it more "
-        "seldom has harder ones left. Nothing here is judged by itself.",
+        "seldom has harder ones left. A pair of which one did not run says so. Nothing here is "
+        "judged by itself.",
         RECOVERIES,
         _covered,
         also=(ROLLOUTS,),

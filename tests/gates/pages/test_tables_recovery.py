@@ -82,3 +82,18 @@ def test_a_table_that_is_not_the_report_s_is_not_shown(ladder, judged):
     evidence.edit_table(ladder, TABLE, lambda frame: frame.head(1))
     for found in drawn(ladder, report):
         assert "is not the file that the report names" in found.skipped
+
+
+def test_one_that_did_not_run_takes_no_other_pair_away(ladder):
+    """A candidate that was not admitted has no rollouts; the others are shown as ever."""
+    _, before = drawn(ladder, judge(ladder, "D"))
+    gone = evidence.CANDIDATES[0]
+    for table in ("stress/rollouts.parquet", TABLE):
+        evidence.edit_table(ladder, table, lambda frame: frame[frame["method"] != gone])
+    _, after = drawn(ladder, judge(ladder, "D"))
+    assert after.skipped == "" and len(after.listed) == len(before.listed)
+    others = [line for line in before.listed if line[0] != gone]
+    assert others and [line for line in after.listed if line[0] != gone] == others
+    for line in after.listed:
+        if line[0] == gone:
+            assert gone in line[3] and set(line[4:]) == {""}
