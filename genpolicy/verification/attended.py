@@ -1,9 +1,9 @@
 """A person who has the arm, followed again: what may move it meanwhile, and what counts after it.
 
 From the call on nothing of the policy is executed or taken into the queue; the person's chunks are
-executed while the person has the arm and at no other time; coming and going clears no stop, and goes
-with the state of recovery that says so; and an episode in which somebody was called is no success
-of the policy.
+executed while the person has the arm and at no other time; coming and going clears no stop, and
+goes with the state of recovery that says so; and an episode in which somebody was called is no
+success of the policy.
 """
 
 import math

@@ -35,13 +35,13 @@ class Recovering:
         self.called = False
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
-        """Take an event in; yields a transition that there is not, and what the policy does in it."""
+        """Take an event in; yields a transition that there is not, and what the policy does."""
         if kind == "accept" and self.state != IDLE:
-            yield "P8.recovery", f"The policy's action is executed, recovery is in {self.state!r}."
+            yield "P8.recovery", f"The policy acts while recovery is in {self.state!r}."
         elif kind == "recovery":
             old, new = m["old"], m["new"]
             leads = (*LEADS_TO.get(old, ()), *([] if old == STOPPED else [STOPPED]))
             if old != self.state or new not in leads or new == old:
-                yield "P8.recovery", f"Recovery goes from {old!r} to {new!r}, in {self.state!r}."
+                yield "P8.recovery", f"From {self.state!r} recovery goes {old!r} to {new!r}."
             self.state = new
             self.called |= new in CALLS

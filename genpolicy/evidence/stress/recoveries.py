@@ -1,8 +1,8 @@
 """Each entry into recovery as a row: why it began, what it did, and what followed.
 
 A recovery is more than another sample. It counts where its own primitive commanded the arm to
-its goal, the policy took over from there and the episode succeeded; not where the same phase had to be
-recovered again, where a person was called, or where new samples alone had helped.
+its goal, the policy took over from there and the episode succeeded; not where the same phase had
+to be recovered again, where a person was called, or where new samples alone had helped.
 """
 
 from collections.abc import Iterable

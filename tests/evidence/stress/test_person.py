@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from genpolicy.evidence.stress.person import WHO, Attendance, PersonSettings, person_s
+from genpolicy.evidence.stress.perturbations import CameraDelay
 from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome
@@ -93,6 +94,19 @@ def test_after_it_the_policy_goes_on_and_its_success_is_not_one(helped):
     assert any(event.n > went for event in of_kind(helped, "accept"))
     assert helped.world.success and helped.outcome is Outcome.ASSISTED
     assert helped.person.calls == 1 and person_s(helped.journal.events()) > 0.5
+
+
+def test_the_next_arrival_after_a_hand_back_may_be_older_and_costs_an_invocation(play):
+    """Decision 232: a late camera shows what was before, which is void; nothing of it is used."""
+    rollout = play(schedule=CameraDelay(magnitude_s=0.08))
+    went = next(e for e in of_kind(rollout, "person") if e.payload["stage"] == "handed_back")
+    void = next(e for e in of_kind(rollout, "invalidate") if e.n > went.n)
+    begun = [e.payload for e in of_kind(rollout, "conditioning") if e.n > went.n]
+    assert begun[0]["exposed_ns"] < void.payload["before_ns"]
+    used = {e.payload["chunk_id"] for e in of_kind(rollout, "accept")}
+    names = {one["id"] for one in begun if one["exposed_ns"] < void.payload["before_ns"]}
+    assert not used & names
+    assert any(e.n > went.n for e in of_kind(rollout, "accept"))
 
 
 def test_without_a_person_the_call_ends_the_rollout_as_ever(play):
