@@ -120,7 +120,7 @@ class Recovery:
             self._refuse("a resolution without a person", "a person's name")
         self._go(now_s, RecoveryState.IDLE, f"resolved by {person}")
 
-    def person_took_over(self, now_s: float, person: str) -> None:
+    def person_takes_over(self, now_s: float, person: str) -> None:
         """Who was asked has come and has the arm."""
         self._expect(RecoveryState.ASK_HUMAN)
         self._go(now_s, RecoveryState.PERSON, f"taken over by {person}")

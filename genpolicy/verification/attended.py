@@ -16,7 +16,7 @@ from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.recovering import ABORTED, ASKED, IDLE, PERSON, STOPPED, Recovering
 
 Finding = tuple[str, str]
-TOOK = "took_over"
+BEGINS = "took_over"
 GONE = {"handed_back": IDLE, "gave_up": ABORTED, "episode_over": "ended"}
 """Ways to leave the arm: the state of recovery, or the mode, that is entered with each."""
 STOPS = ("protective_stop", "emergency_stop")
@@ -81,7 +81,7 @@ class Attended:
             self._asked_ns = None
 
     def _person(self, m: Message) -> Iterator[Finding]:
-        if m["stage"] == TOOK:
+        if m["stage"] == BEGINS:
             asked = self._recovering.state == ASKED and self._mode == CALLED
             if self._who or not asked or not str(m["who"]).strip():
                 yield "P8.take_over", f"{m['who']!r} takes over in mode {self._mode!r}."
@@ -149,7 +149,7 @@ class _Session:
             self.called.append(m["t"])
         elif (kind == "recovery" and m["old"] == ASKED) or kind == "end":
             self.over.setdefault(len(self.called) - 1, m["t"])
-        elif kind == "person" and m["stage"] == TOOK:
+        elif kind == "person" and m["stage"] == BEGINS:
             self.came[len(self.called) - 1] = self.since_ns = m["t"]
         elif kind == "person":
             self.had_ns += m["t"] - self.since_ns

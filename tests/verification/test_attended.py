@@ -12,10 +12,10 @@ HELD = ("recovery", {"old": "idle", "new": "hold"})
 ASKED = ("recovery", {"old": "hold", "new": "ask_human"})
 INTERVENES = ("mode", {"old": "fallback", "new": "intervention"})
 CALLED = (FELL, HELD, ASKED, INTERVENES)
-TOOK = ("person", {"stage": "took_over", "who": WHO})
+BEGINS = ("person", {"stage": "took_over", "who": WHO})
 DRIVES = ("mode", {"old": "intervention", "new": "fallback"})
 HAS = ("recovery", {"old": "ask_human", "new": "person"})
-CAME = (TOOK, DRIVES, HAS)
+CAME = (BEGINS, DRIVES, HAS)
 CHUNK = ("enqueue", {"arrival": 1, "chunk_id": "c", "method": WHO})
 ROW = ("fallback", {"arrival": 1})
 LEFT = ("person", {"stage": "handed_back", "who": WHO})
@@ -55,10 +55,10 @@ def test_called_come_driven_and_gone_is_in_order():
 @pytest.mark.parametrize(
     ("events", "rule"),
     [
-        ((*CALLED[:3], TOOK), "P8.take_over"),
-        ((*CALLED, *CAME, TOOK), "P8.take_over"),
+        ((*CALLED[:3], BEGINS), "P8.take_over"),
+        ((*CALLED, *CAME, BEGINS), "P8.take_over"),
         ((*CALLED, ("person", {"stage": "took_over", "who": " "})), "P8.take_over"),
-        ((FELL, HELD, INTERVENES, TOOK), "P8.take_over"),
+        ((FELL, HELD, INTERVENES, BEGINS), "P8.take_over"),
         ((*CALLED, STOPPED, *CAME), "P8.stop"),
         ((*CALLED, *CAME, STOPPED, CLEARED), "P8.reset"),
         ((*CALLED, *CAME, OF_POLICY), "P8.queue"),
@@ -80,7 +80,7 @@ def test_called_come_driven_and_gone_is_in_order():
         ((*CALLED, *CAME, LATER, FREE), "P8.person"),
         ((*CALLED, *CAME, LATER, LEAVES), "P8.person"),
         # Or its state is.
-        ((*CALLED, TOOK, DRIVES, LATER), "P8.person"),
+        ((*CALLED, BEGINS, DRIVES, LATER), "P8.person"),
         ((*CALLED, *CAME, LATER, LEFT, *BACK, ("end", {})), "P8.person"),
         ((*CALLED, *CAME, LATER, OVER, LATER), "P8.person"),
         ((*CALLED[:3], LATER), "P8.called"),
@@ -113,7 +113,7 @@ def planned(tmp_path, *, later=0, had_ns=1_000_000_000, comes=True, waits=40, pe
     came_ns = 1_000_000_000 + round(period_s * 1e9 * (int(due_s / period_s) + 1 + later))
     if comes:
         journal.add("recovery", came_ns, asked | HAS[1])
-        journal.add("person", came_ns, TOOK[1])
+        journal.add("person", came_ns, BEGINS[1])
         journal.add("person", came_ns + had_ns, LEFT[1])
     elif waits is not None:
         aborted = {"old": "ask_human", "new": "abort"}

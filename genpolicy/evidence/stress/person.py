@@ -117,7 +117,7 @@ class Attendance:
             come = now_s >= self._ready_s - 1e-9 and self._executor.take_over(now_s, WHO)
             if not come:
                 return True
-            self._recovery.person_took_over(now_s, WHO)
+            self._recovery.person_takes_over(now_s, WHO)
             self._since_s, self._planned = now_s, None
         if self._spent_s + (now_s - self._since_s) > settings.longest_s:
             self._executor.intervene(now_s)
