@@ -221,6 +221,7 @@ class Walk:
 
     def _deliver_fallback(self) -> None:
         own = {"policy_checkpoint_hash": FALLBACK_HASH, "sampler_config_hash": FALLBACK_HASH}
+        own["method"] = "fallback"
         self._give(self._made(**own, predecessor_chunk_id=""), self.rig.now_s, fallback=True)
 
     def _garbage(self) -> None:
