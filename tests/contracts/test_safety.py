@@ -44,9 +44,9 @@ WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/")
 """What scores journals."""
 REPORTS = {
     "gates/diagnosis/of_motion.py", "gates/pages/tables_monitors.py", "gates/rederive_monitors.py",
-    "gates/stress/gate.py", "gates/stress/monitors.py", "stages/_monitors.py",
+    "gates/planning.py", "gates/stress/gate.py", "gates/stress/monitors.py", "stages/_monitors.py",
 }  # fmt: skip
-"""Who else may know of monitors: what runs the scoring, proves it, and reports it."""
+"""Who else may know of monitors: what counts their rollouts, scores, proves and reports."""
 JUDGES = tuple(f"gates/stress/{name}.py" for name in ("trial", "cost", "safety", "choice", "gains"))
 """Criteria of Gate D and its choice, none of which may hang on a monitor, by whatever way."""
 DECIDES = (

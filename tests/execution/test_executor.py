@@ -111,7 +111,7 @@ def test_fallback_commands_only_in_its_mode_and_is_tagged():
     rig = Rig()
     rig.observe()
     mark = {"policy_checkpoint_hash": FALLBACK_HASH,
-            "sampler_config_hash": FALLBACK_HASH}  # fmt: skip
+            "sampler_config_hash": FALLBACK_HASH, "method": "fallback"}  # fmt: skip
     assert rig.executor.deliver_fallback(rig.chunk(**mark), 0.0) is R.STOPPED
     assert rig.deliver(rig.chunk(**mark)) is R.CHECKPOINT_MISMATCH
     rig.executor.begin_fallback(0.0)

@@ -85,7 +85,9 @@ def gate_evidence() -> ModuleType:
     spec = importlib.util.spec_from_file_location("stage_gate_evidence", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(path.parent)  # it reads what lies beside it
+        spec.loader.exec_module(module)
     return module
 
 
@@ -95,8 +97,8 @@ def evidence(workspace: Path, gate_evidence: ModuleType) -> Path:
     shared = yaml.safe_load((workspace / "params.yaml").read_text())
     gate_evidence.build(workspace)
     own = yaml.safe_load((workspace / "params.yaml").read_text())
-    horizons = {**shared["horizons"], **own["horizons"]}
-    params = {**shared, **own, "horizons": horizons}
+    both = {name: {**shared[name], **own[name]} for name in ("horizons", "compute")}
+    params = {**shared, **own, **both}
     (workspace / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
     return workspace
 

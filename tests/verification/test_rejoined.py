@@ -152,7 +152,7 @@ def chunk(name, start, *, before="", **changes):
 def entered(rejoined, told, *, rule="ensemble_oldest", now=None, parents=None, index=0, draw=None):
     """One chunk from its begin to the queue; what is objected to."""
     name, now = told["chunk_id"], told["start_ns"] + 10 if now is None else now
-    rejoined.begin({"id": name, "t": told["start_ns"]})
+    rejoined.begin({"id": name, "exposed_ns": told["start_ns"]})
     own = {
         "chunk_id": name, "invocation": name, "rule": rule, "t": now, "parents": parents or {},
         "draw": index if draw is None else draw,
@@ -205,7 +205,7 @@ def test_a_chunk_of_another_pace_has_no_say():
 
 def test_what_came_after_the_question_has_no_say(session):
     """Real-time chunks go on from the plan of when they were begun, nearest from their first."""
-    session.begin({"id": "d", "t": 60})
+    session.begin({"id": "d", "exposed_ns": 60})
     assert not entered(session, chunk("c", 60, before="b"), parents={"a": [1, 2], "b": [1, 6]})
     own = {"chunk_id": "d", "invocation": "d", "rule": "real_time", "t": 90, "draw": 0,
            "parents": {"b": [0, 6]}}  # fmt: skip
@@ -215,7 +215,7 @@ def test_what_came_after_the_question_has_no_say(session):
 
 def test_a_plan_that_came_after_the_invocation_began_is_none_to_go_on_from(session):
     """Whatever predecessor it names."""
-    session.begin({"id": "d", "t": 60})
+    session.begin({"id": "d", "exposed_ns": 60})
     assert not entered(session, chunk("c", 60, before="b"), parents={"a": [1, 2], "b": [1, 6]})
     own = {"chunk_id": "d", "invocation": "d", "rule": "real_time", "t": 90, "draw": 0,
            "parents": {"c": [0, 8]}}  # fmt: skip
@@ -227,7 +227,7 @@ def test_a_plan_that_came_after_the_invocation_began_is_none_to_go_on_from(sessi
 def test_the_candidates_of_an_invocation_rest_on_one_plan(session):
     own = {"chunk_id": "c", "invocation": "c", "rule": "bidirectional", "t": 70, "draw": 1,
            "parents": {"b": [1, 6]}}  # fmt: skip
-    session.begin({"id": "c", "t": 60})
+    session.begin({"id": "c", "exposed_ns": 60})
     assert not [*session.join(own), *session.judge({"chunk_id": "c", "index": 0})]
     later = own | {"t": 80, "parents": {"b": [2, 6]}}
     assert [*session.join(later)] == [
@@ -245,7 +245,7 @@ def test_nobody_chooses_a_sample_without_a_plan(session):
 
 
 def test_a_chunk_starts_when_it_was_asked_for(session):
-    session.begin({"id": "c", "t": 90})
+    session.begin({"id": "c", "exposed_ns": 90})
     own = {"chunk_id": "c", "invocation": "c", "rule": "real_time", "t": 110, "draw": 0,
            "parents": {}}  # fmt: skip
     assert not [*session.join(own), *session.judge({"chunk_id": "c", "index": 0})]

@@ -7,14 +7,12 @@ comes of an episode after it is not the policy's.
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
 
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
-from genpolicy.contract.settings import Settings
+from genpolicy.evidence.stress.settings import PersonSettings
 from genpolicy.execution.attended import AttendedExecutor
 from genpolicy.execution.cell import RecoveryState
 from genpolicy.execution.journal import Event
@@ -29,31 +27,6 @@ WHO = "scripted person"
 """Its name, by which its chunks and its events are known; no name of anybody."""
 PLAN = RecoveryState.CLASSICAL_RETURN
 """What it drives: the task's way back to where the policy can begin."""
-Seconds = Annotated[float, Field(ge=0.0)]
-
-
-class PersonSettings(Settings):
-    """Section `stress.person`.
-
-    Attributes:
-        reaction_s: Least and most time from the call until it has the arm, s; drawn uniformly,
-            for each call of a start alike for all methods.
-        longest_s: How long it may have the arm in one rollout, s; then it gives up.
-    """
-
-    reaction_s: tuple[Seconds, Seconds]
-    longest_s: float = Field(gt=0.0)
-
-    @field_validator("reaction_s", mode="before")
-    @classmethod
-    def _pair(cls, value: object) -> object:
-        return tuple(value) if isinstance(value, list) else value
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if not self.reaction_s[1] >= self.reaction_s[0]:
-            raise ValueError("the least reaction time comes first")
-        return self
 
 
 class Attendance:

@@ -1,14 +1,13 @@
 """Section `stress`: the matched comparison, registered before it runs."""
 
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.rows.stress import SeverityRow
-from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope, gradable
 
 GRADED = "@"
@@ -16,6 +15,7 @@ GRADED = "@"
 ENVELOPE = "envelope"
 """Name of the condition that runs inside the trial card's envelope, and its kind."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Seconds = Annotated[float, Field(ge=0.0)]
 
 
 class Grades(Settings):
@@ -35,6 +35,30 @@ class Grades(Settings):
         if not all(low < high for low, high in pairwise(values)):
             raise ValueError("the sizes must rise")
         return values
+
+
+class PersonSettings(Settings):
+    """Section `stress.person`.
+
+    Attributes:
+        reaction_s: Least and most time from the call until it has the arm, s; drawn uniformly,
+            for each call of a start alike for all methods.
+        longest_s: How long it may have the arm in one rollout, s; then it gives up.
+    """
+
+    reaction_s: tuple[Seconds, Seconds]
+    longest_s: float = Field(gt=0.0)
+
+    @field_validator("reaction_s", mode="before")
+    @classmethod
+    def _pair(cls, value: object) -> object:
+        return tuple(value) if isinstance(value, list) else value
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.reaction_s[1] >= self.reaction_s[0]:
+            raise ValueError("the least reaction time comes first")
+        return self
 
 
 class StressSettings(Settings):

@@ -20,8 +20,8 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.stress.latency import LatencyModel
-from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.evidence.stress.settings import PersonSettings
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings

@@ -14,8 +14,9 @@ from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import Overrun, Term, overruns
 from genpolicy.evidence.stress.latency import LatencyModel, draw_check, draw_latency
-from genpolicy.evidence.stress.person import Attendance, PersonSettings
+from genpolicy.evidence.stress.person import Attendance
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
+from genpolicy.evidence.stress.settings import PersonSettings
 from genpolicy.execution.attended import AttendedExecutor
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Journal

@@ -11,6 +11,7 @@ from genpolicy.evidence.shadow import layer_mutants
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, always
 from genpolicy.evidence.shadow.layer_mutants import RULES, missing_checks_evidence
 from genpolicy.evidence.shadow.observations import spread
+from genpolicy.evidence.shadow.stop_mutants import DEAF, PREFIX
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.execution.checks import without
 from genpolicy.feasibility.batch import Margins
@@ -49,6 +50,7 @@ def test_the_gate_asks_for_every_row_of_both_tables():
     expected = [f"{check.layer}.{check.name}" for check in CHECKS]
     expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
     expected += [f"execution.vote_{check.name}" for check in VOTE_CHECKS]
+    expected += [f"execution.{PREFIX}{name}" for name in DEAF]
     assert list(CHECKS_ASKED_FOR) == expected
     some = [c for c in CORRUPTIONS if c.check and c.applicable is not always]
     assert {f"{c.layer}.{c.check}" for c in some} == set(NOT_ASKED_OF_EVERY_TASK)

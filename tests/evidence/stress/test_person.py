@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import pytest
 from pydantic import ValidationError
 
-from genpolicy.evidence.stress.person import WHO, Attendance, PersonSettings, person_s
+from genpolicy.evidence.stress.person import WHO, Attendance, person_s
 from genpolicy.evidence.stress.perturbations import CameraDelay
 from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.settings import PersonSettings
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings, RecoveryState
 from genpolicy.seeds import stream

@@ -20,9 +20,8 @@ from genpolicy.evidence.stress.latency import (
     LatencyModel,
 )
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
-from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.settings import PersonSettings, StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import (
     AGE_LEVELS,
@@ -129,7 +128,7 @@ def test_a_server_that_does_not_start_costs_its_deadlines_and_nobody_else_s(
 
 
 def test_a_person_for_whom_nobody_waits_as_long_is_refused(tmp_path):
-    judged, models = [JudgedPolicy("a", 0, tmp_path, "")], {"a": None}
+    judged, models = [JudgedPolicy("a", 0, tmp_path, "", "cpu")], {"a": None}
     waits_s = EXECUTION.human_timeout_s
     for latest_s, refused in ((waits_s, False), (waits_s + 0.1, True)):
         person = PersonSettings(reaction_s=(0.0, latest_s), longest_s=1.0)
