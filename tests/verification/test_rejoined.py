@@ -244,13 +244,13 @@ def test_nobody_chooses_a_sample_without_a_plan(session):
     assert found == "candidate 0 of 'c' is sample 1, and nothing chose"
 
 
-def test_a_chunk_starts_when_it_was_asked_for(session):
+def test_a_chunk_starts_where_what_it_saw_was_exposed(session):
     session.begin({"id": "c", "exposed_ns": 90})
     own = {"chunk_id": "c", "invocation": "c", "rule": "real_time", "t": 110, "draw": 0,
            "parents": {}}  # fmt: skip
     assert not [*session.join(own), *session.judge({"chunk_id": "c", "index": 0})]
     (found,) = session.enter(chunk("c", 400))
-    assert found == "'c' starts at 400 ns, and was asked at 90 ns"
+    assert found == "'c' starts at 400 ns, and saw what was at 90 ns"
 
 
 def test_what_is_stated_is_read_in_the_order_in_which_it_entered(session):
