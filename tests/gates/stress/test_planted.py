@@ -12,7 +12,6 @@ from pathlib import Path
 import evidence
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pytest
 from asked import found_in, settings_of
 from editing import cells
@@ -22,7 +21,6 @@ from gates.evidence import Evidence
 from gates.proof import judge
 from gates.stress.pairs import paired_differences
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.sessions import episode_specs
@@ -219,24 +217,19 @@ def test_no_demonstration_begins_where_the_comparison_begins():
 
 def drawn(root, number, truth):
     """Outcomes of the candidate drawn anew: on each start one draw for all conditions."""
-    path = root / "artifacts" / ROLLOUTS
-    frame = read_table(path).to_pandas()
     won = stream(13, "planted", "good", number).random(evidence.STARTS) < truth
-    success = np.where(own(frame), won[frame["start"].to_numpy()], frame["success"]).astype(bool)
-    write_table(
-        path,
-        pa.Table.from_pandas(
-            frame.assign(
-                success=success,
-                outcome=np.where(
-                    success, "success", np.where(own(frame), "timeout", frame["outcome"])
-                ),
-                recovered=success & frame["recovery_attempted"],
-            ),
-            preserve_index=False,
-        ),
-    )
-    evidence.record(root)
+
+    def change(frame):
+        mine = own(frame)
+        success = np.where(mine, won[frame["start"].to_numpy()], frame["success"]).astype(bool)
+        lost = np.where(mine, "timeout", frame["outcome"])
+        return frame.assign(
+            success=success,
+            outcome=np.where(success, "success", lost),
+            recovered=success & frame["recovery_attempted"],
+        )
+
+    evidence.edit_table(root, ROLLOUTS, change)
 
 
 def test_a_good_candidate_passes_eighteen_of_twenty_times(ladder):
