@@ -152,10 +152,10 @@ def test_rollouts_and_time_are_those_of_methods_conditions_and_starts(planned):
 
 def test_what_is_graded_and_what_is_probed_is_counted_apart(planned):
     """Sizes beside the judged one are run by all methods, probes by the candidates alone."""
-    push, jitter = {"force_n": [7.5, 15.0, 30.0]}, {"magnitude_s": [0.06, 0.12]}
+    delay, jitter = {"magnitude_s": [0.04, 0.08, 0.16]}, {"magnitude_s": [0.06, 0.12]}
     severities = {
         name: {"field": field, "values": values}
-        for name, sizes in (("push", push), ("network_jitter", jitter))
+        for name, sizes in (("camera_delay", delay), ("network_jitter", jitter))
         for field, values in sizes.items()
     }
     probes = {"lighting": {"severities": [1.0, 2.0]}, "unseen_object": {"severities": [2.0]}}
