@@ -88,8 +88,9 @@ def test_who_stands_is_who_was_admitted_in_its_order(fleet, brought, tmp_path):
     assert [one.name for one in found] == ["planted", "flow"]
     assert admitted_contenders(tmp_path, ["flow"], others, seed=0, device="cpu")[0].name == "flow"
     compared = in_comparison(
-        tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0
-    )
+        tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0,
+        device="cpu",
+    )  # fmt: skip
     assert [one.name for one in compared] == ["bc", "flow", "planted"]
     only = in_comparison(
         tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0, device="cpu"

@@ -45,6 +45,7 @@ LOCAL = {
     ("genpolicy/pages/audit/pictures.py", "left"): "matplotlib: where a title stands",
     ("genpolicy/pages/figures/drawing.py", "left"): "the same",
     ("genpolicy/execution/cell.py", "retreat"): "a primitive of recovery, not a phase",
+    ("genpolicy/verification/recovering.py", "retreat"): "the same",
     ("gates/pages/plots_stress.py", "post"): "matplotlib: a step behind the point",
     ("gates/pages/plots_feasibility.py", "post"): "matplotlib: a step behind the point",
     ("genpolicy/evidence/shadow/rig.py", "approach"): "a phase of the rig's own",

@@ -108,7 +108,9 @@ def test_stress_rolls_out_what_passed_gate_c(
     )
     monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
     watched = []
-    monkeypatch.setattr(stress, "watch", lambda _, __, admitted, ___: watched.extend(admitted))
+    monkeypatch.setattr(
+        stress, "watch", lambda _, __, ___, admitted, ____: watched.extend(admitted)
+    )
     stress.work(params)
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
@@ -119,7 +121,7 @@ def test_stress_rolls_out_what_passed_gate_c(
 def test_without_probes_there_are_tables_without_rows(evidence, params, monkeypatch):
     monkeypatch.setattr(_monitors, "write_monitors", None)
     params.raw["stress"]["monitors"] = {}
-    _monitors.watch(params, None, (), {})
+    _monitors.watch(params, _monitors.planned(params), None, (), {})
     written = evidence / "artifacts" / "monitors"
     assert len(list(written.glob("*.parquet"))) == 5
     assert not (written / "journals").exists()
@@ -128,4 +130,4 @@ def test_without_probes_there_are_tables_without_rows(evidence, params, monkeypa
 def test_a_key_that_no_monitor_has_is_refused_with_its_place(params):
     params.raw["stress"]["monitors"] = {"kindz": []}
     with pytest.raises(ConfigError, match=r"stress\.monitors"):
-        _monitors.watch(params, None, (), {})
+        _monitors.planned(params)

@@ -34,13 +34,7 @@ from genpolicy.evidence.stress.exposures import Exposure, Exposures, conditioned
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.joined import Joined
 from genpolicy.evidence.stress.splices import Splice, splice_of
-from genpolicy.evidence.stress.state import (
-    InFlight,
-    Outcome,
-    Setup,
-    Tally,
-    in_flight,
-)
+from genpolicy.evidence.stress.state import InFlight, Outcome, Setup, Tally, in_flight
 from genpolicy.execution.attended import AttendedExecutor
 from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
