@@ -71,7 +71,8 @@ def test_nothing_written_is_nothing_to_prove(tmp_path, params):
         (ALARMS, MonitorAlarmRow, lambda r: [replace(r, success=True)], "success"),
         (ALARMS, MonitorAlarmRow, lambda r: [], "only in scores.parquet"),
         (SCORES, MonitorScoreRow, lambda r: [replace(r, phase="retreat")], "alarm"),
-        (ROLLOUTS, RolloutRow, lambda r: [replace(r, success=not r.success)], "success"),
+        # The first sets thresholds: one success more or less is an episode more or less.
+        (ROLLOUTS, RolloutRow, lambda r: [replace(r, success=not r.success)], "episodes"),
         (ROLLOUTS, RolloutRow, lambda r: [], "only in a journal"),
     ],
 )
@@ -83,6 +84,14 @@ def test_a_changed_row_is_refused(root, params, path, row, how, match):
     else:
         change(root, path, row, how)
     refused(root, params, match)
+
+
+def test_another_success_of_a_judged_rollout_is_refused(root, params):
+    rows = read_rows(root / ROLLOUTS, RolloutRow)
+    place = next(n for n, one in enumerate(rows) if one.perturbation == "judged")
+    other = replace(rows[place], success=not rows[place].success)
+    write_rows(root / ROLLOUTS, RolloutRow, [*rows[:place], other, *rows[place + 1 :]])
+    refused(root, params, "success")
 
 
 def test_other_starts_than_planned_are_refused(root, params):
