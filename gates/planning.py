@@ -21,9 +21,8 @@ from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from gates.stress.trial import reachable
 from gates.verdicts import judge_criterion, rounded
-from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.documents.stress import Power
-from genpolicy.evidence.monitors.settings import MonitorsSettings
+from genpolicy.evidence.monitors.settings import monitors_settings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
 from genpolicy.seeds import stream
@@ -164,7 +163,7 @@ def plan_of(root: Path) -> Plan:
     of_condition = len(methods) * settings.planned_starts
     rollouts = of_condition * len(planned.perturbations)
     graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
-    probed = len(settings.candidates) * _probed(planned)
+    probed = len(settings.candidates) * monitors_settings(planned.monitors).rollouts
     power = limits.number(REACHABLE, otherwise=POWER)
     table = power_document(
         planned, candidates=len(settings.candidates), root_seed=settings.root_seed
@@ -185,21 +184,6 @@ def plan_of(root: Path) -> Plan:
         bounds=tuple(_bounds(settings, limits, table)),
         gains=tuple(_gains(settings, power)),
     )
-
-
-def _probed(planned: StressSection) -> int:
-    """Rollouts of each admitted candidate for the monitors.
-
-    Raises:
-        ConfigError: `stress.monitors` has an unknown key or a wrong value.
-    """
-    monitors = parse_settings(
-        MonitorsSettings, planned.monitors, where="params.yaml: stress.monitors"
-    )
-    if not monitors.on:
-        return 0
-    probed = len(monitors.conditions) * monitors.probe_starts
-    return monitors.threshold_starts + monitors.judged_starts + probed
 
 
 def _bounds(settings: StressSettings, limits: Limits, table: Power) -> Iterator[Bound]:

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from gates.rederive_shadow import TaskSection
-from gates.settings import PARAMS_FILE, section_of
+from gates.settings import section_of
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
-from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import start_hashes
-from genpolicy.evidence.monitors.settings import MonitorsSettings
+from genpolicy.evidence.monitors.settings import monitors_settings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.shadow.tables import checked
@@ -32,7 +31,6 @@ from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.rollouts import derived_with_recoveries
 
 SCORES = "scores.parquet"
-WHERE = f"{PARAMS_FILE}: stress.monitors"
 PHASE = ("method", "monitor", "phase")
 OF_A_ROLLOUT = ("method", "monitor", "family", "severity", "start", "phase")
 ROLLOUT = ("method", "perturbation", "start")
@@ -57,9 +55,7 @@ def rederive_monitors(
     folder = root / MONITORS
     if not folder.is_dir():
         return
-    settings = parse_settings(
-        MonitorsSettings, section_of(params, "stress").get("monitors", {}), where=WHERE
-    )
+    settings = monitors_settings(section_of(params, "stress").get("monitors", {}))
     task = load_task(section(params, "task", TaskSection).name)
     rollouts = read_rows(folder / "rollouts.parquet", RolloutRow)
     scores = read_rows(folder / "scores.parquet", MonitorScoreRow)

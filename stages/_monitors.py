@@ -4,16 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from genpolicy.candidates.contenders import Contender
-from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.fixtures_again import NO_FIXTURES
 from genpolicy.evidence.monitors.plan import (
-    WHERE,
     plan_judged,
     plan_thresholds,
     require_runnable,
 )
 from genpolicy.evidence.monitors.scored import Scoring, scorings
-from genpolicy.evidence.monitors.settings import MonitorsSettings
+from genpolicy.evidence.monitors.settings import MonitorsSettings, monitors_settings
 from genpolicy.evidence.monitors.tables import Work, write_monitors, write_unwatched
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.settings import StressSettings
@@ -35,7 +33,7 @@ def planned(params: Params) -> MonitorsSettings:
             probe, or probes are asked for under a rule of joining that they cannot be scored under.
     """
     stress = params.section("stress", StressSettings)
-    section = parse_settings(MonitorsSettings, stress.monitors, where=WHERE)
+    section = monitors_settings(stress.monitors)
     require_runnable(section, stress.joining, load_task(params.task.name), root_seed=params.seed)
     return section
 

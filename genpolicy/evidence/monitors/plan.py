@@ -5,7 +5,7 @@ false alarm, none of either is one of the matched comparison, and all severities
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from genpolicy.candidates.contenders import Contender
@@ -14,6 +14,7 @@ from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.evidence.monitors.settings import (
     JUDGED,
     THRESHOLDS,
+    WHERE,
     MonitorsSettings,
     condition_of,
 )
@@ -25,7 +26,34 @@ from genpolicy.tasks.api import NOMINAL_PROBE, Task, WorldSettings
 
 PROBED = "probed"
 STREAM = "monitors"
-WHERE = "params.yaml: stress.monitors"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Rollouts of one kind.
+
+    Attributes:
+        name: Their condition.
+        probe: What the task is under.
+        kind: Which starts; all conditions of a kind share them.
+        count: How many.
+    """
+
+    name: str
+    probe: str
+    kind: str
+    count: int
+
+
+def setting_thresholds(settings: MonitorsSettings) -> list[Condition]:
+    """Nominal rollouts whose successes set the thresholds."""
+    return [Condition(THRESHOLDS, NOMINAL_PROBE, THRESHOLDS, settings.threshold_starts)]
+
+
+def judging(settings: MonitorsSettings) -> list[Condition]:
+    """Other nominal rollouts, then every family and severity."""
+    probed = [Condition(name, name, PROBED, settings.probe_starts) for name in settings.conditions]
+    return [Condition(JUDGED, NOMINAL_PROBE, JUDGED, settings.judged_starts), *probed]
 
 
 def require_runnable(
@@ -77,19 +105,15 @@ def starts_of(task: Task, kind: str, *, root_seed: int, count: int) -> tuple[str
 
 def start_hashes(task: Task, settings: MonitorsSettings, *, root_seed: int) -> list[str]:
     """Condition, start and hash of the state after reset, of every rollout that is planned."""
-    planned = [
-        (THRESHOLDS, NOMINAL_PROBE, THRESHOLDS, settings.threshold_starts),
-        (JUDGED, NOMINAL_PROBE, JUDGED, settings.judged_starts),
-        *((name, name, PROBED, settings.probe_starts) for name in settings.conditions),
-    ]
     found = []
-    for condition, probe, kind, count in planned:
-        for index, text in enumerate(starts_of(task, kind, root_seed=root_seed, count=count)):
+    for one in (*setting_thresholds(settings), *judging(settings)):
+        starts = starts_of(task, one.kind, root_seed=root_seed, count=one.count)
+        for index, text in enumerate(starts):
             world = task.make_world(
                 task.start_from_json(text),
-                settings=WorldSettings(task.calibration_epochs[-1], probe, seed=index),
+                settings=WorldSettings(task.calibration_epochs[-1], one.probe, seed=index),
             )
-            found.append(f"{condition}/{index}/{world.state_sha256()}")
+            found.append(f"{one.name}/{index}/{world.state_sha256()}")
     return found
 
 
@@ -103,10 +127,8 @@ def plan_thresholds(
     journals: Path,
 ) -> list[Shard]:
     """Nominal rollouts whose successes set the thresholds, one shard per method."""
-    return _shards(
-        comparison, judged, task, {THRESHOLDS: (NOMINAL_PROBE, THRESHOLDS)},
-        {THRESHOLDS: settings.threshold_starts}, latency=latency, journals=journals,
-    )  # fmt: skip
+    conditions = setting_thresholds(settings)
+    return _shards(comparison, judged, task, conditions, latency=latency, journals=journals)
 
 
 def plan_judged(
@@ -119,36 +141,33 @@ def plan_judged(
     journals: Path,
 ) -> list[Shard]:
     """Other nominal rollouts, then every family and severity; a shard per method and condition."""
-    conditions = {JUDGED: (NOMINAL_PROBE, JUDGED)}
-    conditions |= {name: (name, PROBED) for name in settings.conditions}
-    counts = {JUDGED: settings.judged_starts, PROBED: settings.probe_starts}
-    return _shards(comparison, judged, task, conditions, counts, latency=latency, journals=journals)
+    conditions = judging(settings)
+    return _shards(comparison, judged, task, conditions, latency=latency, journals=journals)
 
 
 def _shards(
     comparison: Comparison,
     judged: Sequence[Contender],
     task: Task,
-    conditions: Mapping[str, tuple[str, str]],
-    counts: Mapping[str, int],
+    conditions: Sequence[Condition],
     *,
     latency: Mapping[str, LatencyModel],
     journals: Path,
 ) -> list[Shard]:
     drawn = {
-        kind: starts_of(task, kind, root_seed=comparison.root_seed, count=count)
-        for kind, count in counts.items()
+        one.kind: starts_of(task, one.kind, root_seed=comparison.root_seed, count=one.count)
+        for one in conditions
     }
     return [
         Shard(
-            comparison=replace(comparison, starts=drawn[kind]),
+            comparison=replace(comparison, starts=drawn[one.kind]),
             judged=policy,
             latency=latency[policy.name],
-            perturbation=condition,
+            perturbation=one.name,
             schedule=Nominal(),
-            journal=journals / f"{policy.name}__{condition}.mcap",
-            probe=probe,
+            journal=journals / f"{policy.name}__{one.name}.mcap",
+            probe=one.probe,
         )
-        for condition, (probe, kind) in conditions.items()
+        for one in conditions
         for policy in judged
     ]

@@ -1,14 +1,16 @@
 """`stress.monitors`: which probes are run, and what the monitors are asked."""
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from genpolicy.contract.settings import Settings
+from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.monitors.names import CONTROLS
 from genpolicy.monitors.registry import MONITORS
 
+WHERE = "params.yaml: stress.monitors"
 SEPARATOR = "@"
 """Between a family of probes and its severity, in the name of a condition."""
 THRESHOLDS, JUDGED = "thresholds", "judged"
@@ -77,6 +79,14 @@ class MonitorsSettings(Settings):
         return bool(self.kinds and self.probes)
 
     @property
+    def rollouts(self) -> int:
+        """Rollouts of each method that is watched."""
+        if not self.on:
+            return 0
+        probed = len(self.conditions) * self.probe_starts
+        return self.threshold_starts + self.judged_starts + probed
+
+    @property
     def watching(self) -> tuple[str, ...]:
         """Monitors that are asked, the controls last."""
         return (*self.kinds, *CONTROLS)
@@ -89,6 +99,15 @@ class MonitorsSettings(Settings):
             for name, family in self.probes.items()
             for severity in family.severities
         )
+
+
+def monitors_settings(values: Mapping[str, Any]) -> MonitorsSettings:
+    """What stands in `stress.monitors`, whose own section knows nothing of it.
+
+    Raises:
+        ConfigError: An unknown key or a wrong value.
+    """
+    return parse_settings(MonitorsSettings, values, where=WHERE)
 
 
 def condition_of(family: str, severity: float) -> str:
