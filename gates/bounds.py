@@ -58,6 +58,21 @@ def interval_of(
     return clopper_pearson(successes, trials, confidence)
 
 
+def wide_interval(
+    hits: Array | NDArray[np.bool_],
+    clusters: NDArray[np.generic] | list[str],
+    *,
+    confidence: float,
+) -> tuple[float, float, float]:
+    """As `share_interval`, the count rounded down for the lower bound and up for the upper one.
+
+    For what is shown, or held against limits on both sides.
+    """
+    share, lower, _ = share_interval(hits, clusters, confidence=confidence, favourable=True)
+    upper = share_interval(hits, clusters, confidence=confidence, favourable=False)[2]
+    return share, lower, upper
+
+
 def counted_interval(hits: float, trials: float, *, confidence: float) -> tuple[float, float]:
     """Exact interval of a share of independent trials.
 
@@ -87,11 +102,10 @@ def widest_gap(
     Raises:
         MissingEvidenceError: A group without rows.
     """
-    bounds: dict[str, tuple[float, float, float]] = {}
-    for name, (hits, clusters) in shares.items():
-        share, lower, _ = share_interval(hits, clusters, confidence=confidence, favourable=True)
-        upper = share_interval(hits, clusters, confidence=confidence, favourable=False)[2]
-        bounds[name] = (share, lower, upper)
+    bounds = {
+        name: wide_interval(hits, clusters, confidence=confidence)
+        for name, (hits, clusters) in shares.items()
+    }
     found = []
     for more, less in itertools.permutations(bounds, 2):
         (p, p_lower, p_upper), (q, q_lower, q_upper) = bounds[more], bounds[less]

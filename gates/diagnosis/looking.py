@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from gates.bounds import share_interval, upper_quantile
+from gates.bounds import upper_quantile, wide_interval
 from gates.diagnosis.reports import NoAnswer, Reports
 from gates.doubt import sentence
 from gates.evidence import MissingEvidenceError
@@ -147,8 +147,7 @@ def share_of(hits: pd.Series, clusters: pd.Series, *, confidence: float) -> tupl
         MissingEvidenceError: No rows.
     """
     marked, drawn = hits.to_numpy(dtype=np.float64), clusters.to_numpy()
-    share, low, _ = share_interval(marked, drawn, confidence=confidence, favourable=True)
-    high = share_interval(marked, drawn, confidence=confidence, favourable=False)[2]
+    share, low, high = wide_interval(marked, drawn, confidence=confidence)
     return share, (low, high)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from gates.bounds import share_interval
+from gates.bounds import wide_interval
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import CURVES, NOMINAL, ROLLOUTS
 from genpolicy.evidence.rows.stress import NEUTRAL, RolloutRow, SeverityRow
@@ -116,15 +116,10 @@ def _point(
     rows: pd.DataFrame, name: str, severity: float, judged: bool, confidence: float
 ) -> Point:
     part = rows[rows["perturbation"] == name]
-    share, lower, _ = share_interval(
-        part["success"].to_numpy(), part["start"].to_numpy(),
-        confidence=confidence, favourable=True,
-    )  # fmt: skip
-    _, _, upper = share_interval(
-        part["success"].to_numpy(), part["start"].to_numpy(),
-        confidence=confidence, favourable=False,
-    )  # fmt: skip
-    return Point(severity, judged, share, lower, upper, part["start"].nunique())
+    interval = wide_interval(
+        part["success"].to_numpy(), part["start"].to_numpy(), confidence=confidence
+    )
+    return Point(severity, judged, *interval, part["start"].nunique())
 
 
 def _half(

@@ -19,6 +19,7 @@ from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow, MonitorUnavailableRow
 from genpolicy.evidence.stress.shard import Shard
 from genpolicy.execution.journal import Event, read_journal
+from genpolicy.execution.nanoseconds import NS_PER_S
 from genpolicy.monitors.protocol import Fit, Invocation, Monitor, Unavailable
 from genpolicy.monitors.registry import MONITORS, READ_DRAWS
 from genpolicy.policies.matched_training import training_windows
@@ -28,7 +29,6 @@ from genpolicy.tasks.api import Task, load_task
 
 Array = NDArray[np.float64]
 
-NS_PER_S = 1e9
 DATASET = "ingest"
 FAILS = (GenpolicyError, ArithmeticError, ValueError, RuntimeError)
 """How a monitor fails: numbers that are none, or a fit that does not come about."""

@@ -14,8 +14,8 @@ from genpolicy.evidence.stress.shard import Shard
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import PRIMITIVES, RecoveryState
 from genpolicy.execution.journal import Event
+from genpolicy.execution.nanoseconds import NS_PER_S
 
-NS_PER_S = 1e9
 HANDED_BACK, EPISODE_OVER = "handed_back", "episode_over"
 ENDS = {
     RecoveryState.IDLE: HANDED_BACK,
