@@ -16,7 +16,7 @@ from gates.pages.page import index_page
 from gates.proof import judge
 from gates.writing import write_gate
 from genpolicy.contract.action import join_action
-from genpolicy.execution.journal import Journal, encode_actions, write_journal
+from genpolicy.execution.journal import JOURNAL_VERSION, Journal, encode_actions, write_journal
 
 ROLLOUTS = "stress/rollouts.parquet"
 JOURNALS = "artifacts/stress/journals"
@@ -30,7 +30,7 @@ def session(method, condition, start):
         ("execution_horizon", "period_ns", "maximum_age_ns", "watchdog_ns", "queue_capacity",
          "replan_lead_steps", "late_chunk", "fallback_hash", "controller_mode", "checks_missing")
     )  # fmt: skip
-    journal.add("session", 0, {"version": 7, "labels": {"method": method}, **blank})
+    journal.add("session", 0, {"version": JOURNAL_VERSION, "labels": {"method": method}, **blank})
     journal.add("scene", 0, {"bodies": {}})
     journal.add("phase", 0, {"event_time_ns": 0, "old": "", "new": "approach"})
     for row in range(40):
