@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from gates.bounds import share_interval
+from gates.bounds import wide_interval
 from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import StressSettings
@@ -158,12 +158,11 @@ def felt(rollouts: pd.DataFrame) -> pd.DataFrame:
 
 
 def share(rows: pd.DataFrame, confidence: float) -> Interval:
-    """Share of rollouts with an alarm, over their starts."""
+    """Share of rollouts with an alarm, over their starts; good of probes, bad of successes."""
     if len(rows) == 0:
         return (math.nan, 0.0, 1.0)
     hits = flags(rows, "alarm")
-    starts = rows["start"].to_numpy()
-    return share_interval(hits, starts, confidence=confidence, favourable=True)
+    return wide_interval(hits, rows["start"].to_numpy(), confidence=confidence)
 
 
 def monitors_said(judged: Judged) -> list[str]:

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import evidence
+import pandas as pd
 import pytest
 import watched
 
@@ -17,6 +18,7 @@ from gates.stress.monitors import (
     UNWATCHED,
     by_rollout,
     felt,
+    share,
     watched_of,
 )
 from gates.stress.rollouts import StressSettings
@@ -24,6 +26,7 @@ from genpolicy.errors import IntegrityError
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.monitors.names import TIME, VARIANCE
+from genpolicy.statistics.intervals import clopper_pearson
 
 
 @pytest.fixture
@@ -162,3 +165,13 @@ def test_the_report_says_that_no_monitor_has_authority_and_no_criterion_hangs_on
 def test_planned_evidence_is_what_this_file_says():
     assert sum(watched.succeeds("judged", start) for start in range(8)) == 6
     assert math.isclose(len(watched.rollouts()), 2 * (12 + 8 + 12))
+
+
+def test_a_count_of_starts_that_is_no_whole_number_is_wide_to_both_sides():
+    """One alarm in three rollouts of two starts is two thirds of a start: none below, one above.
+
+    Rounded down alone, false alarms would be bounded as if there had been none.
+    """
+    rows = pd.DataFrame({"alarm": [True, False, False], "start": [0, 0, 1]})
+    none, one = (clopper_pearson(hits, 2, 0.95) for hits in (0, 1))
+    assert share(rows, 0.95) == (pytest.approx(1 / 3), none[0], one[1])
