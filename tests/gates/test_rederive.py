@@ -104,8 +104,8 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
         now_s = tick * horizons.action_period_s
-        executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         journal.exposure(now_s, np.zeros(24))
+        executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         executor.tick(now_s)
         journal.arrived(now_s + SENSED_S, exposed_s=now_s)
     executor.begin_invocation(0.2, "one", repr(FIRST_S))
