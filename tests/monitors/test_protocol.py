@@ -7,6 +7,6 @@ from genpolicy.monitors.protocol import NO_WEIGHTS, Fit
 
 def test_a_fit_holds_training_windows_alone():
     assert [field.name for field in fields(Fit)] == [
-        "windows", "normalisation", "action_period_s", "policy", "others",
+        "windows", "normalisation", "action_period_s", "policy", "others", "candidates",
     ]  # fmt: skip
     assert "not known here" in NO_WEIGHTS.why

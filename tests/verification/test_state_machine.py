@@ -41,7 +41,7 @@ FORGERIES = {
     "ghost": lambda rig: {"predecessor_chunk_id": "ghost"},
     "replan": lambda rig: {"predecessor_chunk_id": ""},
     "id": lambda rig: {"chunk_id": "chunk-1"},
-    "fallback": lambda rig: {"policy_checkpoint_hash": FALLBACK_HASH,
+    "fallback": lambda rig: {"method": "fallback", "policy_checkpoint_hash": FALLBACK_HASH,
                              "sampler_config_hash": FALLBACK_HASH},
 }  # fmt: skip
 MALFORMED = (None, 3, "chunk", object(), np.zeros((16, 10)))
