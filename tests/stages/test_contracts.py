@@ -8,10 +8,10 @@ import pytest
 
 from genpolicy.errors import ContractError
 from genpolicy.integrity.hashing import sha256_file
-from stages import train_generators
+from stages import train_baselines, train_factors, train_generators
 from stages._contracts import require_contract_of_task, require_one_contract
 
-TRAIN = (train_generators,)
+TRAIN = (train_baselines, train_factors, train_generators)
 TASK = {"observation_sha256": "o", "action_sha256": "a", "name": "t", "phases": {"all": ["p"]}}
 MANIFEST = {
     "observation_contract": {"sha256": "o"}, "action_contract": {"sha256": "a"}, "phases": ["p"],
@@ -78,8 +78,10 @@ def test_nothing_is_trained_on_a_dataset_of_another_contract(artifacts, monkeypa
     def trains(*_args, **_others):
         pytest.fail("it trained")
 
-    for name, instead in (("admit", lambda *_: None), ("train_matched", trains)):
-        monkeypatch.setattr(stage, name, instead)
+    for name, instead in (
+        ("admit", lambda *_: None), ("train_matched", trains), ("train_variants", trains),
+    ):  # fmt: skip
+        monkeypatch.setattr(stage, name, instead, raising=False)
     artifacts("ingest/manifest.json", {**MANIFEST, "phases": ["q"]})
     with pytest.raises(ContractError, match=r"manifest\.json: phase"):
         stage.work(None)
