@@ -68,7 +68,7 @@ def untrained(folder: Path) -> NetworkPolicy:
     request = TrainingRequest(
         method="diffusion", horizons=HORIZONS, normalisation=Normalisation(**bounds),
         network=settings.network, head=settings.head,
-        training=settings.training.model_copy(update={"steps": 1}), sampler=SAMPLER,
+        training=settings.training.model_copy(update={"updates": 1}), sampler=SAMPLER,
         provenance=Provenance(
             dataset_manifest_sha256="0" * 64, action_contract_sha256="0" * 64,
             observation_contract_sha256="0" * 64,

@@ -39,7 +39,7 @@ class Planned(NamedTuple):
 PLANNED: Mapping[str, Planned] = {
     "seed": Planned("", "A"),
     "policy.seeds": Planned("", "A"),
-    "policy.training.steps": Planned("", "A"),
+    "policy.training.updates": Planned("", "A"),
     "train_generators.samplers": Planned("", "B"),
     "candidates": Planned("", "B"),
     "confidence": Planned(">=", "A"),

@@ -82,8 +82,8 @@ def _compare(root: Path, gate: Gate, seed: Path, stated: dict[str, Any]) -> None
 def _batches(folder: Path) -> tuple[int, int]:
     """Updates of a training, and windows in all of them."""
     training = mapping(mapping(read_json(folder / "config.json")).get("training"))
-    steps, batch = int(training.get("steps", 0)), int(training.get("batch_size", 0))
-    return steps, steps * batch
+    updates, batch = int(training.get("updates", 0)), int(training.get("batch_size", 0))
+    return updates, updates * batch
 
 
 def identity(folder: Path) -> str:

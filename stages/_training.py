@@ -25,21 +25,22 @@ class FactorsSection(Settings):
     """Section `train_factors`.
 
     Attributes:
-        steps: Training updates of every variant, the reference among them.
+        updates: Training updates of every variant, the reference among them.
         variants: Variants by name.
     """
 
-    steps: int = Field(ge=1)
+    updates: int = Field(ge=1)
     variants: dict[str, Variant]
 
 
 def training_plan(
-    params: Params, *, steps: int | None = None, followed: Mapping[str, str] | None = None
+    params: Params, *, updates: int | None = None, followed: Mapping[str, str] | None = None
 ) -> TrainingPlan:
-    """What all trainings share; `steps` shortens them, `followed` is the mode of each episode."""
+    """What all trainings share; `updates` shortens them, `followed` is the mode of each episode."""
     settings = params.section("policy", PolicySettings)
-    if steps is not None:
-        training = settings.training.model_copy(update={"steps": steps, "validation_every": steps})
+    if updates is not None:
+        changed = {"updates": updates, "validation_every": updates}
+        training = settings.training.model_copy(update=changed)
         settings = settings.model_copy(update={"training": training})
     return TrainingPlan(
         dataset=ARTIFACTS / "ingest",

@@ -12,7 +12,7 @@ def work(params: Params) -> None:
     require_one_contract()
     section = params.section("train_factors", FactorsSection)
     samplers = params.section("train_baselines", MethodsSection).samplers
-    plan = training_plan(params, steps=section.steps)
+    plan = training_plan(params, updates=section.updates)
     with output_folder(ARTIFACTS / "train_factors") as folder:
         train_variants(plan, section.variants, samplers, folder=folder)
 

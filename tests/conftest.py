@@ -50,7 +50,7 @@ POLICY = PolicySettings(
         head_parameters=40_000,
     ),
     head=HeadConfig(posterior_width=16),
-    training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
+    training=TrainingConfig(updates=60, batch_size=64, learning_rate=3e-3, warmup_updates=5),
     seeds=[0],
     fixtures=5,
 )  # fmt: skip

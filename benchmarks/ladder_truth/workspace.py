@@ -95,9 +95,9 @@ def brought(target: Path, small_ladder: Path) -> Path:
 
     def change(params: dict[str, Any]) -> None:
         params["source"] = {"kind": "recordings", "path": BROUGHT}
-        params["policy"]["training"] |= {"steps": 60, "warmup_steps": 5, "validation_every": 60}
+        params["policy"]["training"] |= {"updates": 60, "warmup_updates": 5, "validation_every": 60}
         params["policy"]["fixtures"] = 4
-        params["train_factors"]["steps"] = 5
+        params["train_factors"]["updates"] = 5
         variants = params["train_factors"]["variants"]
         params["train_factors"]["variants"] = {name: variants[name] for name in VARIANTS}
         asked = {"factors": ["reference", "representation"]}

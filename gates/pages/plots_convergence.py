@@ -25,13 +25,13 @@ Interval = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Training:
-    """Validation loss of one training, over that after the first measured step.
+    """Validation loss of one training, over that of the first measurement.
 
     Attributes:
         method: The method.
         candidate: Whether the limit on the loss judges it not: a candidate.
         table: Where it stands.
-        steps: Updates after which it was measured. Shape (n,).
+        after: Updates after which it was measured. Shape (n,).
         loss: Loss after each, over the first. Shape (n,).
         moments: Three quarters of the training, and its end.
         spread: At both: ratio, lower and upper end.
@@ -41,7 +41,7 @@ class Training:
     method: str
     candidate: bool
     table: str
-    steps: Array
+    after: Array
     loss: Array
     moments: tuple[int, int]
     spread: tuple[Interval, Interval]
@@ -60,11 +60,11 @@ def _trainings(evidence: Evidence, report: GateReport) -> Iterator[Training]:
             updates = updates_of(evidence, root, method)
             moments = (three_quarters(updates), updates)
             for table, frame in losses(evidence, root, method).items():
-                steps = sorted(int(step) for step in frame["total"].columns)
-                total = {s: frame["total"][s].to_numpy(dtype="float64") for s in steps}
-                if not set(moments) <= set(steps):
+                after = sorted(int(count) for count in frame["total"].columns)
+                total = {s: frame["total"][s].to_numpy(dtype="float64") for s in after}
+                if not set(moments) <= set(after):
                     raise MissingEvidenceError(f"{table} lacks the loss after {moments}")
-                first = total[steps[0]]
+                first = total[after[0]]
                 at = [ratio_of_sums(total[m], first, confidence=confidence) for m in moments]
                 ratio, lower, upper = ratio_of_sums(
                     total[updates], total[moments[0]], confidence=confidence
@@ -73,8 +73,8 @@ def _trainings(evidence: Evidence, report: GateReport) -> Iterator[Training]:
                     method=method,
                     candidate=root == GENERATORS,
                     table=table,
-                    steps=np.array(steps, dtype=np.float64),
-                    loss=np.array([total[s].sum() / first.sum() for s in steps]),
+                    after=np.array(after, dtype=np.float64),
+                    loss=np.array([total[s].sum() / first.sum() for s in after]),
                     moments=moments,
                     spread=(at[0], at[1]),
                     fall=(1.0 - ratio, 1.0 - upper, 1.0 - lower),
@@ -90,7 +90,7 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     figure, (curves, falls) = new_figure(height=1.6 + 0.24 * len(found), columns=2)
     for place, training in enumerate(found):
         look = {"color": colour[training.method], "ls": dash[training.method]}
-        curves.plot(training.steps, training.loss, **look)
+        curves.plot(training.after, training.loss, **look)
         for moment, (point, lower, upper) in zip(training.moments, training.spread, strict=True):
             curves.errorbar(
                 [moment], [point], yerr=[[point - lower], [upper - point]], fmt="o", ms=3,

@@ -50,7 +50,7 @@ class Fall:
 @criterion(
     "<=",
     question="Is the candidate's training done?",
-    look_at="Generator training: samples still change; raise `policy.training.steps`, for all.",
+    look_at="Generator training: samples still change; raise `policy.training.updates`, for all.",
     per_candidate=True,
 )
 def late_change_upper(
@@ -120,11 +120,11 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
     """
     updates = updates_of(evidence, root, method)
     falls = []
-    for table, by_step in losses(evidence, root, method).items():
+    for table, measured in losses(evidence, root, method).items():
         moments = (three_quarters(updates), updates)
-        if any(("total", moment) not in by_step.columns for moment in moments):
+        if any(("total", moment) not in measured.columns for moment in moments):
             raise MissingEvidenceError(f"{table} lacks the loss after {moments[0]} or {updates}")
-        kept = by_step.loc[:, [(name, m) for name in ("total", "windows") for m in moments]]
+        kept = measured.loc[:, [(name, m) for name in ("total", "windows") for m in moments]]
         if bool(kept.isna().any(axis=None)) or not (kept["total"].to_numpy() > 0).all():
             raise MissingEvidenceError(f"{table} lacks the loss of an episode")
         if not (kept["windows"][moments[0]] == kept["windows"][updates]).all() or len(kept) < 2:
@@ -136,7 +136,7 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
 
 
 def losses(evidence: Evidence, root: str, method: str) -> dict[str, pd.DataFrame]:
-    """By table of a training seed: total loss and windows of each held-out episode after each step.
+    """By table of a training seed: total loss and windows of held-out episodes, by updates so far.
 
     Raises:
         MissingEvidenceError: It was not measured in every training of the method, or stated twice.
@@ -149,9 +149,11 @@ def losses(evidence: Evidence, root: str, method: str) -> dict[str, pd.DataFrame
     for table in tables:
         rows = evidence.rows(table, ValidationRow)
         rows = rows.assign(total=numbers(rows, "loss") * numbers(rows, "windows"))
-        if rows.duplicated(["episode_uuid", "step"]).any():
+        if rows.duplicated(["episode_uuid", "updates"]).any():
             raise MissingEvidenceError(f"{table} states a loss twice")
-        found[table] = rows.pivot(index="episode_uuid", columns="step", values=["total", "windows"])
+        found[table] = rows.pivot(
+            index="episode_uuid", columns="updates", values=["total", "windows"]
+        )
     return found
 
 
@@ -164,7 +166,7 @@ def updates_of(evidence: Evidence, root: str, method: str) -> int:
     entry = evidence.document(root, MATCHED).methods.get(method)
     if entry is None:
         raise MissingEvidenceError(f"{root}/{MATCHED.file} does not say how {method} was trained")
-    return entry.config.training.steps
+    return entry.config.training.updates
 
 
 def has_training(evidence: Evidence, method: str) -> bool:

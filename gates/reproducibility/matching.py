@@ -84,10 +84,10 @@ def trained(
     done = judge_criterion(fall.interval[1], limit, "<=", fall.interval)
     near = []
     for frame in losses(evidence, root, method).values():
-        steps = sorted(int(step) for step in frame["total"].columns)
-        total = [float(frame["total"][step].sum()) for step in steps]
+        after = sorted(int(count) for count in frame["total"].columns)
+        total = [float(frame["total"][count].sum()) for count in after]
         beyond = [place for place, loss in enumerate(total) if loss > (1.0 + limit) * total[-1]]
-        near.append(steps[beyond[-1] + 1 if beyond else 0])
+        near.append(after[beyond[-1] + 1 if beyond else 0])
     return Trained(method, updates_of(evidence, root, method), fall, max(near), done)
 
 

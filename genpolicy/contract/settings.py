@@ -1,6 +1,6 @@
 """Settings: frozen, strict sections; what breaks the schema is one `ConfigError` with a place."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -16,6 +16,14 @@ class Settings(BaseModel):
 
 Section = TypeVar("Section", bound=BaseModel)
 
+RENAMED = {
+    "policy.training.steps": "updates",
+    "policy.training.warmup_steps": "warmup_updates",
+    "train_factors.steps": "updates",
+}
+"""Keys of `params.yaml` that have another name now, by their place; `steps` are a sampler's."""
+UNKNOWN = "extra_forbidden"
+
 
 def parse_settings(model: type[Section], values: Mapping[str, Any], *, where: str) -> Section:
     """The section that `values` (from `params.yaml`) describe.
@@ -30,11 +38,24 @@ def parse_settings(model: type[Section], values: Mapping[str, Any], *, where: st
 
 
 def _refuse(error: ValidationError, where: str) -> NoReturn:
-    first = error.errors(include_url=False)[0]
-    place = ".".join([where, *(str(part) for part in first["loc"])])
+    found = error.errors(include_url=False)
+    for unknown in (one for one in found if one["type"] == UNKNOWN):
+        place = _place(where, unknown["loc"])
+        if now := RENAMED.get(place.rpartition(" ")[2]):
+            raise ConfigError(
+                where=place,
+                found=f"an unknown key {unknown['loc'][-1]}; it is called {now} now",
+                expected=f"`{now}`",
+                action="Rename it; the value stays.",
+            ) from error
+    first = found[0]
     raise ConfigError(
-        where=place,
+        where=_place(where, first["loc"]),
         found=repr(first.get("input"))[:120],
         expected=first["msg"],
         action="Correct this setting.",
     ) from error
+
+
+def _place(where: str, loc: Sequence[int | str]) -> str:
+    return ".".join([where, *(str(part) for part in loc)])

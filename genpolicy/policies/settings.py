@@ -76,24 +76,24 @@ class TrainingConfig(Settings):
     """Optimisation, equal for every method.
 
     Attributes:
-        steps: Optimiser updates; also the stopping rule.
+        updates: Optimiser updates; also the stopping rule.
         batch_size: Windows per update.
         learning_rate: Peak of the schedule, after a linear warm-up, before the cosine decay.
-        warmup_steps: Updates of the warm-up.
+        warmup_updates: Updates of the warm-up.
         weight_decay: AdamW's weight decay.
         beta_1: AdamW's first-moment decay.
         beta_2: AdamW's second-moment decay.
         gradient_clip: Largest global gradient norm.
-        ema_power: Exponent of the averaging decay `1 - (1 + step)^-power`.
+        ema_power: Exponent of the averaging decay `1 - (1 + update)^-power`.
         ema_cap: Largest averaging decay.
         mask_padding: Whether padded actions stay out of the loss.
         validation_every: Updates between two measurements of the averaged weights.
     """
 
-    steps: int = Field(default=5000, ge=1, le=10_000_000)
+    updates: int = Field(default=5000, ge=1, le=10_000_000)
     batch_size: int = Field(default=256, ge=1, le=65_536)
     learning_rate: float = Field(default=1e-3, gt=0.0)
-    warmup_steps: int = Field(default=300, ge=0)
+    warmup_updates: int = Field(default=300, ge=0)
     weight_decay: float = Field(default=1e-6, ge=0.0)
     beta_1: float = Field(default=0.95, ge=0.0, lt=1.0)
     beta_2: float = Field(default=0.999, ge=0.0, lt=1.0)

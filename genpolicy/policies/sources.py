@@ -57,7 +57,7 @@ def take_over(
             action="Train both in one run (`dvc repro train_baselines`).",
         )
     network.load_state_dict({**network.state_dict(), **checkpoint.network.state_dict()})
-    return {"step": config.training.steps, "training_loss": None, "validation_loss": None}
+    return {"updates": config.training.updates, "training_loss": None, "validation_loss": None}
 
 
 def teacher_of(method: Method, folder: Path | None, request: TrainingRequest) -> Checkpoint | None:
@@ -112,11 +112,11 @@ def distilled(teacher: Checkpoint | None, request: TrainingRequest) -> Distilled
     if teacher is None:
         return None
     own, before = request.training, teacher.config.training
-    windows, windows_before = own.steps * own.batch_size, before.steps * before.batch_size
+    windows, windows_before = own.updates * own.batch_size, before.updates * before.batch_size
     return Distilled(
         teacher=teacher.config.method,
         teacher_sha256=teacher.sha256,
-        updates=own.steps + before.steps,
+        updates=own.updates + before.updates,
         evaluations=windows * EVALUATIONS_PER_WINDOW + windows_before,
         gradients=windows * GRADIENTS_PER_WINDOW + windows_before,
     )

@@ -2,7 +2,7 @@
 
 AdamW with warm-up and cosine decay and an exponential moving average of the weights, which is
 what is evaluated and saved (defaults after Chi et al., arXiv 2303.04137). Every method with the
-same seed sees the same batches in the same order. The stopping rule is a fixed number of steps.
+same seed sees the same batches in the same order. The stopping rule is a fixed number of updates.
 """
 
 import copy
@@ -104,7 +104,7 @@ def train(
         trained = _finished(averaged, followed, objective, data)
     summary = {
         "stopping_rule": _stopping_rule(taken),
-        "steps": request.training.steps,
+        "updates": request.training.updates,
         "evaluated_weights": "exponential moving average",
         **_given("", windows),
         **_given("validation_", validation),
@@ -163,20 +163,21 @@ def _validation_rows(followed: Validation | None, weights_of: Path | None) -> li
 
 
 def _stopping_rule(weights_of: Path | None) -> str:
-    return f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
+    return f"weights of {weights_of.parent.name}" if weights_of else "fixed number of updates"
 
 
-def learning_rate(step: int, config: TrainingConfig) -> float:
-    """Rate of an update: linear warm-up, then a cosine to zero at the last step."""
-    if step < config.warmup_steps:
-        return config.learning_rate * (step + 1) / config.warmup_steps
-    progress = (step - config.warmup_steps) / max(1, config.steps - config.warmup_steps)
+def learning_rate(update: int, config: TrainingConfig) -> float:
+    """Rate of an update: linear warm-up, then a cosine to zero at the last one."""
+    warmup = config.warmup_updates
+    if update < warmup:
+        return config.learning_rate * (update + 1) / warmup
+    progress = (update - warmup) / max(1, config.updates - warmup)
     return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * progress))
 
 
-def averaging_decay(step: int, config: TrainingConfig) -> float:
-    """Share of the old average kept after update `step` (from 0)."""
-    return float(min(config.ema_cap, 1.0 - (1.0 + step) ** -config.ema_power))
+def averaging_decay(update: int, config: TrainingConfig) -> float:
+    """Share of the old average kept after an update, counted from 0."""
+    return float(min(config.ema_cap, 1.0 - (1.0 + update) ** -config.ema_power))
 
 
 def _batch_of(
@@ -194,7 +195,7 @@ def _follow(
     windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
 ) -> Validation:
     held_out = _batch_of(windows, horizons, request, device)
-    keep = three_quarters(request.training.steps) if request.keep_earlier else None
+    keep = three_quarters(request.training.updates) if request.keep_earlier else None
     return Validation(held_out, windows.episodes, seed=request.seed, device=device, keep_after=keep)
 
 
@@ -277,36 +278,36 @@ def _optimise(
     order = _batch_order(len(data.actions), config.batch_size, request.seed)
     total, counted = torch.zeros((), device=device), 0
     measured_after = moments(config)
-    for step in counting(config.steps, f"{request.method}, update"):
+    for update in counting(config.updates, f"{request.method}, update"):
         rows = torch.as_tensor(next(order)).to(device)
         batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
         for group in optimiser.param_groups:
-            group["lr"] = learning_rate(step, config)
+            group["lr"] = learning_rate(update, config)
         loss = objective.loss(network, batch, generator)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(trained, config.gradient_clip)
         optimiser.step()
         with torch.no_grad():
-            torch._foreach_lerp_(average, current, 1.0 - averaging_decay(step, config))
+            torch._foreach_lerp_(average, current, 1.0 - averaging_decay(update, config))
             objective.updated(network)
         total, counted = total + loss.detach(), counted + 1
-        if followed and step + 1 in measured_after:
-            followed.follow(step + 1, averaged, objective)
-        if (step + 1) % config.validation_every == 0 or step + 1 == config.steps:
+        if followed and update + 1 in measured_after:
+            followed.follow(update + 1, averaged, objective)
+        if (update + 1) % config.validation_every == 0 or update + 1 == config.updates:
             mean_loss = float(total) / counted
             if not math.isfinite(mean_loss):
                 raise NonFiniteError(
-                    where=f"loss of {request.method}, step {step + 1}",
+                    where=f"loss of {request.method}, update {update + 1}",
                     found=repr(mean_loss),
                     expected="a finite number",
                     action="Lower the learning rate; nothing was written.",
                 )
             yield {
-                "step": step + 1,
+                "updates": update + 1,
                 "training_loss": mean_loss,
                 "validation_loss": followed.loss(averaged, objective) if followed else None,
-                "learning_rate": learning_rate(step, config),
+                "learning_rate": learning_rate(update, config),
             }
             total, counted = torch.zeros((), device=device), 0
 

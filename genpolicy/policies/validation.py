@@ -23,8 +23,8 @@ EPISODE_WINDOWS = 32
 
 def moments(config: TrainingConfig) -> frozenset[int]:
     """Updates after which the loss of every episode is measured."""
-    regular = range(config.validation_every, config.steps + 1, config.validation_every)
-    return frozenset((*regular, three_quarters(config.steps), config.steps))
+    regular = range(config.validation_every, config.updates + 1, config.validation_every)
+    return frozenset((*regular, three_quarters(config.updates), config.updates))
 
 
 class Validation:
@@ -69,13 +69,13 @@ class Validation:
         """Mean loss over windows of the whole split."""
         return self._loss(network, objective, self._all, "validation_noise")
 
-    def follow(self, step: int, network: PolicyNetwork, objective: Objective) -> None:
+    def follow(self, updates: int, network: PolicyNetwork, objective: Objective) -> None:
         """Measure every episode after so many updates; keep the network where it is asked for."""
-        if step == self._keep_after:
+        if updates == self._keep_after:
             self.earlier = copy.deepcopy(network)
         for name, windows in self._by_episode.items():
             loss = self._loss(network, objective, windows, f"validation_noise/{name}")
-            self.rows.append(ValidationRow(step, name, len(windows.actions), loss))
+            self.rows.append(ValidationRow(updates, name, len(windows.actions), loss))
 
     def _loss(
         self, network: PolicyNetwork, objective: Objective, windows: Batch, noise: str

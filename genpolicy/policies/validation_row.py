@@ -12,18 +12,18 @@ class ValidationRow:
     """`validation.parquet` of a checkpoint: loss of the averaged weights on a held-out episode.
 
     Attributes:
-        step: Updates so far.
+        updates: Updates so far.
         episode_uuid: The episode.
         windows: Windows of it, at equal distances.
         loss: Mean loss over them; each method has its own loss.
     """
 
-    step: int
+    updates: int
     episode_uuid: str
     windows: int
     loss: float
 
 
-def three_quarters(steps: int) -> int:
+def three_quarters(updates: int) -> int:
     """The update with which the last quarter of a training begins."""
-    return steps - steps // 4
+    return updates - updates // 4

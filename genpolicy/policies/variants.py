@@ -149,7 +149,7 @@ def train_variants(
         name: read_json(folder / name / f"seed_{plan.settings.seeds[0]}" / CONFIG_FILE)
         for name in variants
     }
-    document = isolation(variants, configs, reference) | {"steps": plan.settings.training.steps}
+    document = isolation(variants, configs, reference) | {"updates": plan.settings.training.updates}
     write_bytes(folder / "variants.json", canonical_json(document))
 
 

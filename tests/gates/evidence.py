@@ -932,7 +932,7 @@ def _matched(methods: tuple[str, ...], *, dataset: str = "0" * 64) -> dict[str, 
         "normalisation": {"observation": extent, "action": extent},
         "network": NetworkConfig().model_dump(mode="json"),
         "head": HeadConfig().model_dump(mode="json"),
-        "training": TrainingConfig(steps=UPDATES).model_dump(mode="json"),
+        "training": TrainingConfig(updates=UPDATES).model_dump(mode="json"),
         "training_seed": 0,
         "sampler": SamplerConfig(name="direct").model_dump(mode="json"),
         "provenance": {
@@ -967,16 +967,16 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 
 def validation(fall: float = 0.04) -> list[dict[str, Any]]:
     """Validation loss of 20 episodes, falling by `fall` over the last quarter."""
-    uneven = {step: 0.002 * (step == UPDATES) for step in (2000, 3000, UPDATES)}
+    uneven = {count: 0.002 * (count == UPDATES) for count in (2000, 3000, UPDATES)}
     return [
         {
-            "step": step,
+            "updates": count,
             "episode_uuid": f"e{e}",
             "windows": 32,
-            "loss": loss * (1 + 0.1 * (e % 3)) * (1 + uneven[step] * (-1) ** e),
+            "loss": loss * (1 + 0.1 * (e % 3)) * (1 + uneven[count] * (-1) ** e),
         }
         for e in range(20)
-        for step, loss in ((2000, 1.5), (3000, 1.0), (UPDATES, 1.0 - fall))
+        for count, loss in ((2000, 1.5), (3000, 1.0), (UPDATES, 1.0 - fall))
     ]
 
 
@@ -1040,7 +1040,7 @@ def _factors(root: Path) -> None:
     document(
         root,
         "train_factors/variants.json",
-        {"reference": "reference", "steps": 10, "variants": variants},
+        {"reference": "reference", "updates": 10, "variants": variants},
     )
     _checkpoints(root, "train_factors", tuple(VARIANTS))
 

@@ -57,7 +57,7 @@ def train_flow(folder, *, seed):
             head_parameters=40_000,
         ),
         head=HeadConfig(posterior_width=16),
-        training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
+        training=TrainingConfig(updates=60, batch_size=64, learning_rate=3e-3, warmup_updates=5),
         sampler=SamplerConfig(name="euler", steps=2),
         provenance=Provenance(
             dataset_manifest_sha256="a" * 64, action_contract_sha256="b" * 64,

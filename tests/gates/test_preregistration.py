@@ -136,9 +136,9 @@ def test_how_much_is_looked_at_is_planned(section, name, value):
 
 def test_the_training_is_planned():
     def more(params):
-        params["policy"] = {"training": {"steps": 9}}
+        params["policy"] = {"training": {"updates": 9}}
 
-    assert _moved(more) == [("policy.training.steps", "changed")]
+    assert _moved(more) == [("policy.training.updates", "changed")]
 
 
 def test_every_strict_side_of_the_cause_belongs_to_a_question():

@@ -20,8 +20,8 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.policies import distillation
 
-TRAINING = {"steps": 100, "batch_size": 8}
-OF_TEACHER = {"steps": 50, "batch_size": 6}
+TRAINING = {"updates": 100, "batch_size": 8}
+OF_TEACHER = {"updates": 50, "batch_size": 6}
 """Other numbers than the student's: whose windows count three times must be seen."""
 GENERATORS = "artifacts/train_generators"
 
@@ -92,7 +92,7 @@ def test_a_training_that_says_nothing_of_itself_counts_for_nothing(tmp_path, see
     for training in ({}, {"training": {"batch_size": 8}}, {"training": 3}):
         _write(seeds[1] / "config.json", {**training, "distilled": said})
         rederive_costs(tmp_path, seeds)
-    _write(seeds[1] / "config.json", {"training": {"steps": 100}, "distilled": said})
+    _write(seeds[1] / "config.json", {"training": {"updates": 100}, "distilled": said})
     with pytest.raises(RefusedError, match=r"distilled: updates is 50, required 150"):
         rederive_costs(tmp_path, seeds)
 

@@ -47,7 +47,7 @@ def policies(tmp_path_factory, statistics):
     """By method and training seed, on demand."""
     root, made = tmp_path_factory.mktemp("policies"), {}
 
-    def of(method, seed=0, steps=200):
+    def of(method, seed=0, updates=200):
         if (method, seed) not in made:
             folder = root / f"{method}_{seed}"
             request = TrainingRequest(
@@ -68,11 +68,11 @@ def policies(tmp_path_factory, statistics):
                 ),
                 head=HeadConfig(latent_dim=4, posterior_width=16),
                 training=TrainingConfig(
-                    steps=steps,
+                    updates=updates,
                     batch_size=64,
                     learning_rate=3e-3,
-                    warmup_steps=10,
-                    validation_every=steps,
+                    warmup_updates=10,
+                    validation_every=updates,
                 ),
                 sampler=SAMPLERS[method],
                 normalisation=statistics,

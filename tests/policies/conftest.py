@@ -50,7 +50,7 @@ def two_mode_windows(count: int = 512, *, seed: int = 0) -> Windows:
 
 
 def request_for(
-    method: str, *, seed: int = 3, steps: int = 20, **changes: object
+    method: str, *, seed: int = 3, updates: int = 20, **changes: object
 ) -> TrainingRequest:
     windows = two_mode_windows()
     numbers = {
@@ -69,7 +69,11 @@ def request_for(
         "network": NETWORK,
         "head": HeadConfig(latent_dim=4, posterior_width=16),
         "training": TrainingConfig(
-            steps=steps, batch_size=128, learning_rate=3e-3, warmup_steps=10, validation_every=10
+            updates=updates,
+            batch_size=128,
+            learning_rate=3e-3,
+            warmup_updates=10,
+            validation_every=10,
         ),
         "sampler": SamplerConfig(
             name=name, steps=sampler_steps, population=POPULATION.get(name, 1)

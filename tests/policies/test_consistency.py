@@ -28,7 +28,7 @@ def shares(tmp_path_factory, two_mode_windows, request_for):
         sampler = SamplerConfig(name=name, steps=steps)
         if not folder.exists():
             head = HeadConfig(latent_dim=4, posterior_width=16, flow_segments=segments)
-            request = request_for(method, steps=500, head=head, sampler=sampler)
+            request = request_for(method, updates=500, head=head, sampler=sampler)
             train(folder, request, windows=windows)
         policy = load_policy(folder, sampler=sampler)
         samples = policy.sample(np.zeros((1, 2, 3)), noise_names=[("toy",)], candidates=DRAWN)

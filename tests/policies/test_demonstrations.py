@@ -69,7 +69,7 @@ def test_one_mode_differs_in_its_demonstrations_by_definition_and_nobody_else_ma
     assert found["differing_keys"]["one_mode_bc"] == ["method"]
     summaries = {name: read_json(folder / "training.json") for name, folder in folders.items()}
     assert summaries["one_mode_bc"]["windows"] < summaries["chunked_bc"]["windows"]
-    assert summaries["one_mode_bc"]["steps"] == summaries["chunked_bc"]["steps"]
+    assert summaries["one_mode_bc"]["updates"] == summaries["chunked_bc"]["updates"]
     # The same subset under another name is a difference that the gate sees.
     path = folders["one_mode_bc"] / CONFIG_FILE
     path.write_text(path.read_text().replace('"one_mode_bc"', '"chunked_l1"'))

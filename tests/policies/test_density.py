@@ -205,7 +205,7 @@ def trained(tmp_path_factory, two_mode_windows, request_for):
     """A flow and a diffusion that know two modes, at -1 and at +1."""
     root, windows = tmp_path_factory.mktemp("density"), two_mode_windows()
     for method in DENSITIES:
-        train(root / method, request_for(method, steps=600), windows=windows, validation=windows)
+        train(root / method, request_for(method, updates=600), windows=windows, validation=windows)
     return {method: load_policy(root / method) for method in DENSITIES}
 
 

@@ -35,7 +35,7 @@ def toy(tmp_path_factory, two_mode_windows, request_for):
     """A trained teacher and its student, of the toy on which one step of plain flow collapses."""
     root, windows = tmp_path_factory.mktemp("toy"), two_mode_windows(1024)
     for method, source in (("diffusion", None), ("manicm", root / "diffusion")):
-        request = request_for(method, steps=500)
+        request = request_for(method, updates=500)
         train(root / method, request, windows=windows, weights_of=source)
     return root
 
@@ -124,14 +124,14 @@ def test_a_checkpoint_that_hides_or_invents_a_teacher_is_refused(toy, tmp_path, 
 def test_the_same_seed_gives_the_same_bytes_and_another_teacher_others(
     tmp_path, two_mode_windows, request_for
 ):
-    windows, request = two_mode_windows(1024), request_for("manicm", steps=20)
+    windows, request = two_mode_windows(1024), request_for("manicm", updates=20)
     for name, teacher_windows in (
         ("one", windows),
         ("two", windows),
         ("other", two_mode_windows()),
     ):
         teacher = tmp_path / f"{name}_teacher"
-        train(teacher, request_for("diffusion", steps=20), windows=teacher_windows)
+        train(teacher, request_for("diffusion", updates=20), windows=teacher_windows)
         torch.manual_seed(len(name))
         train(tmp_path / name, request, windows=windows, weights_of=teacher)
     one, two, other = (
@@ -150,7 +150,7 @@ def test_without_a_teacher_or_with_another_s_nothing_is_trained(
     head = HeadConfig(latent_dim=4, posterior_width=16, prediction="x0")
     for change, teacher, wrong in (
         ({}, folders["flow"], "method"),
-        ({"steps": 21}, folders["diffusion"], "training"),
+        ({"updates": 21}, folders["diffusion"], "training"),
         ({"seed": 4}, folders["diffusion"], "training_seed"),
         ({"head": head}, folders["diffusion"], "head"),
     ):
@@ -183,7 +183,7 @@ def test_a_student_is_trained_behind_its_teacher_and_differs_as_methods_may(plan
     said = read_json(folders["manicm"] / CONFIG_FILE)["distilled"]
     assert said["teacher_sha256"] == hashes["diffusion"][0]
     assert read_json(folders["manicm"] / "training.json")["stopping_rule"] == (
-        "fixed number of steps"
+        "fixed number of updates"
     )
     found = matched_configuration(folders, reference="diffusion")
     assert found["differing_keys"]["manicm"] == ["method", "sampler.name", "sampler.steps"]

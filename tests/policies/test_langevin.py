@@ -130,7 +130,7 @@ def test_the_last_candidates_are_drawn_by_the_weight_of_their_scores(gap, share)
 
 def test_a_trained_energy_keeps_both_modes(tmp_path, two_mode_windows, request_for):
     windows = two_mode_windows(1024)
-    train(tmp_path / "ibc", request_for("ibc", steps=600), windows=windows)
+    train(tmp_path / "ibc", request_for("ibc", updates=600), windows=windows)
     sampler = SamplerConfig(name="langevin", steps=50, population=32)
     policy = load_policy(tmp_path / "ibc", sampler=sampler)
     drawn = policy.sample(

@@ -53,8 +53,8 @@ def test_gates_read_it_to_the_byte(folders):
     found = matched_configuration(folders, reference="chunked_bc")
     read = MATCHED.parse(found, where=MATCHED.file)
     assert canonical_json(MATCHED.plain(read)) == canonical_json(found)
-    assert read.methods["flow"].config.training.steps == found["methods"]["flow"]["config"][
-        "training"]["steps"]  # fmt: skip
+    assert read.methods["flow"].config.training.updates == found["methods"]["flow"]["config"][
+        "training"]["updates"]  # fmt: skip
 
 
 def test_a_single_action_method_differs_in_its_horizon_by_definition(folders):
@@ -69,7 +69,7 @@ def test_a_single_action_method_differs_in_its_horizon_by_definition(folders):
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        (("training", "steps"), 61),
+        (("training", "updates"), 61),
         (("training", "learning_rate"), 1e-4),
         (("network", "trunk_width"), 64),
         (("provenance", "dataset_manifest_sha256"), "d" * 64),

@@ -35,7 +35,7 @@ def request_with_phases(request_for, windows, method="bc_noise", **changes):
             **{part: MinMax(rows.min(0), rows.max(0)) for part, rows in numbers.items()}
         ),
         phase_columns=(3, 4),
-        **{"steps": 60, **changes},
+        **{"updates": 60, **changes},
     )
 
 
@@ -122,7 +122,7 @@ def test_the_scale_is_blind_to_held_out_windows(noisy, phased, request_for, tmp_
     assert (tmp_path / "held_out" / WEIGHTS_FILE).read_bytes() == first
 
 
-@pytest.mark.parametrize("changes", [{"steps": 61}, {"seed": 4}])
+@pytest.mark.parametrize("changes", [{"updates": 61}, {"seed": 4}])
 def test_weights_of_another_training_are_refused(noisy, phased, request_for, tmp_path, changes):
     with pytest.raises(IntegrityError, match="trained with other settings"):
         train(

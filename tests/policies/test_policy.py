@@ -240,7 +240,7 @@ def test_generative_heads_keep_both_modes_and_the_mean_lies_between(
     for method, steps in (
         ("chunked_bc", 150), ("ibc", 600), ("diffusion", 700), ("flow", 700),
     ):  # fmt: skip
-        train(tmp_path / method, request_for(method, steps=steps), windows=windows)
+        train(tmp_path / method, request_for(method, updates=steps), windows=windows)
         policy = load_policy(tmp_path / method)
         samples = policy.sample(observation, noise_names=[("modes",)], candidates=200)
         first = samples.actions[0, :, 0, 0]

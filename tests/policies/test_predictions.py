@@ -73,7 +73,7 @@ def test_the_default_trains_on_the_noise_alone(folders, two_mode_windows):
 @pytest.mark.parametrize("name", ["v", "x0"])
 def test_each_kind_learns_both_modes(tmp_path, two_mode_windows, request_for, name):
     head = HeadConfig(latent_dim=4, posterior_width=16, prediction=name)
-    request = request_for("diffusion", steps=500, head=head)
+    request = request_for("diffusion", updates=500, head=head)
     train(tmp_path / name, request, windows=two_mode_windows(1024))
     policy = load_policy(tmp_path / name)
     samples = policy.sample(np.zeros((1, 2, 3)), noise_names=[("modes",)], candidates=200)

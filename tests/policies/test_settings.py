@@ -18,7 +18,7 @@ def test_a_width_is_a_multiple_of_a_vector_register(field):
     [
         (NetworkConfig, {"time_features": 3}), (NetworkConfig, {"trunk": "convolution"}),
         (TrainingConfig, {"beta_1": 1.0}), (TrainingConfig, {"learning_rate": 0.0}),
-        (TrainingConfig, {"ema_cap": 1.0}), (TrainingConfig, {"steps": "10"}),
+        (TrainingConfig, {"ema_cap": 1.0}), (TrainingConfig, {"updates": "10"}),
         (SamplerConfig, {"name": "telepathy"}), (SamplerConfig, {"name": "ddim", "clip": 0.0}),
         (SamplerConfig, {"name": "ddim", "eta": 1.1}),
         (SamplerConfig, {"name": "bosh3", "nfe_cap": 0}),

@@ -51,21 +51,21 @@ def test_padded_actions_do_not_move_the_loss(tmp_path, request_for, two_mode_win
 
 @pytest.mark.parametrize("method", list(METHODS))
 def test_every_loss_learns(tmp_path, method, request_for, two_mode_windows, train_with_teacher):
-    windows, request = two_mode_windows(), request_for(method, steps=60)
+    windows, request = two_mode_windows(), request_for(method, updates=60)
     train_with_teacher(tmp_path / "run", request, windows=windows, validation=windows)
     lines = [
         json.loads(line) for line in (tmp_path / "run" / "metrics.jsonl").read_text().splitlines()
     ]
-    assert [line["step"] for line in lines] == [10, 20, 30, 40, 50, 60]
+    assert [line["updates"] for line in lines] == [10, 20, 30, 40, 50, 60]
     assert lines[-1]["training_loss"] < lines[0]["training_loss"]
     record = json.loads((tmp_path / "run" / "training.json").read_text())
-    assert record["stopping_rule"] == "fixed number of steps"
+    assert record["stopping_rule"] == "fixed number of updates"
     assert record["final"]["validation_loss"] > 0.0
 
 
 def test_schedules():
-    config = TrainingConfig(steps=100, warmup_steps=10, learning_rate=1e-3)
-    rates = [learning_rate(step, config) for step in range(100)]
+    config = TrainingConfig(updates=100, warmup_updates=10, learning_rate=1e-3)
+    rates = [learning_rate(update, config) for update in range(100)]
     assert rates[9] == pytest.approx(1e-3)
     assert np.all(np.diff(rates[:10]) > 0)
     assert np.all(np.diff(rates[10:]) < 0)
@@ -78,7 +78,7 @@ def test_following_the_validation_changes_no_weight_and_is_paired(
     tmp_path, request_for, two_mode_windows
 ):
     """The same windows and noise at three quarters and at the end; without it, the same bytes."""
-    windows, request = two_mode_windows(), request_for("flow", steps=30)
+    windows, request = two_mode_windows(), request_for("flow", updates=30)
     names = np.array([f"e{row % 3}" for row in range(len(windows.actions))])
     named = dataclasses.replace(windows, episodes=names)
     train(tmp_path / "followed", request, windows=windows, validation=named)
@@ -87,20 +87,20 @@ def test_following_the_validation_changes_no_weight_and_is_paired(
     assert weights[0] == weights[1]
     assert not (tmp_path / "alone" / VALIDATION_FILE).exists()
     rows = read_rows(tmp_path / "followed" / VALIDATION_FILE, ValidationRow)
-    assert [(row.step, row.episode_uuid) for row in rows] == [
-        (step, f"e{e}") for step in (10, 20, 23, 30) for e in range(3)
+    assert [(row.updates, row.episode_uuid) for row in rows] == [
+        (count, f"e{e}") for count in (10, 20, 23, 30) for e in range(3)
     ]
     assert {row.windows for row in rows} == {32}
     assert not (tmp_path / "followed" / EARLIER_FOLDER).exists()
     lines = (tmp_path / "followed" / "metrics.jsonl").read_text().splitlines()
-    assert [json.loads(line)["step"] for line in lines] == [10, 20, 30]
+    assert [json.loads(line)["updates"] for line in lines] == [10, 20, 30]
 
 
 def test_the_earlier_weights_are_those_of_three_quarters_and_change_nothing(
     tmp_path, request_for, two_mode_windows
 ):
     """A checkpoint of its own below the result, whose bytes are the same without it."""
-    windows, request = two_mode_windows(), request_for("flow", steps=30)
+    windows, request = two_mode_windows(), request_for("flow", updates=30)
     train(tmp_path / "plain", request, windows=windows, validation=windows)
     kept = dataclasses.replace(request, keep_earlier=True)
     train(tmp_path / "kept", kept, windows=windows, validation=windows)

@@ -32,11 +32,11 @@ def test_windows_and_noise_are_fixed_and_the_random_state_is_not_touched(
     )  # fmt: skip
     followed = Validation(windows, NAMES, seed=5, device="cpu")
     before = torch.get_rng_state()
-    for step in (1, 2):
-        followed.follow(step, checkpoint.network, objective)
+    for count in (1, 2):
+        followed.follow(count, checkpoint.network, objective)
     assert torch.equal(before, torch.get_rng_state())
     first, second = followed.rows[:3], followed.rows[3:]
-    assert [dataclasses.replace(row, step=2) for row in first] == second
+    assert [dataclasses.replace(row, updates=2) for row in first] == second
     assert [(row.episode_uuid, row.windows) for row in first] == [
         ("long", EPISODE_WINDOWS), ("short", EPISODE_WINDOWS), ("one", 1),
     ]  # fmt: skip
@@ -54,16 +54,16 @@ def test_the_network_is_kept_as_it_was_where_it_is_asked_for(folders, two_mode_w
     )
     followed = Validation(windows, None, seed=5, device="cpu", keep_after=2)
     weight = next(network.parameters())
-    for step in (1, 2, 3):
+    for count in (1, 2, 3):
         with torch.no_grad():
-            weight.fill_(float(step))
-        followed.follow(step, network, objective)
-        assert (followed.earlier is None) == (step < 2)
+            weight.fill_(float(count))
+        followed.follow(count, network, objective)
+        assert (followed.earlier is None) == (count < 2)
     assert bool((next(followed.earlier.parameters()) == 2.0).all())
 
 
 @pytest.mark.parametrize(
-    ("steps", "every", "expected"),
+    ("updates", "every", "expected"),
     [
         (4000, 1000, {1000, 2000, 3000, 4000}),
         (1200, 600, {600, 900, 1200}),
@@ -71,10 +71,10 @@ def test_the_network_is_kept_as_it_was_where_it_is_asked_for(folders, two_mode_w
         (1, 5, {1}),
     ],
 )
-def test_three_quarters_and_the_end_are_always_measured(steps, every, expected):
-    config = TrainingConfig(steps=steps, validation_every=every)
+def test_three_quarters_and_the_end_are_always_measured(updates, every, expected):
+    config = TrainingConfig(updates=updates, validation_every=every)
     assert moments(config) == expected
-    assert three_quarters(steps) in expected
+    assert three_quarters(updates) in expected
 
 
 def test_an_episode_for_each_window_or_none(two_mode_windows):

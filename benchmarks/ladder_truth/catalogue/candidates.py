@@ -88,13 +88,13 @@ WRONGS = (
           "Candidates get three times the updates of the baselines that they are held against.",
           "small",
           _settings('{"training": plan.settings.training.model_copy('
-                    'update={"steps": 3 * plan.settings.training.steps})}'),
+                    'update={"updates": 3 * plan.settings.training.updates})}'),
           Expected(B, ("unmatched_keys",))),
     Wrong("candidates_hardly_trained", "training",
           "Candidates get forty updates; their loss still falls.",
           "small",
           _settings('{"training": plan.settings.training.model_copy('
-                    'update={"steps": 40, "warmup_steps": 5, "validation_every": 10})}'),
+                    'update={"updates": 40, "warmup_updates": 5, "validation_every": 10})}'),
           Expected(B, ("unmatched_keys", "validation_fall_upper", "late_change_upper")),
           note="`late_change_upper` took the place of `validation_fall_upper` since."),
     Wrong("candidates_with_a_larger_head", "training",

@@ -37,10 +37,10 @@ class Training:
     Not that class itself: a key that is missing there stands for its default.
     """
 
-    steps: Count
+    updates: Count
     batch_size: Count
     learning_rate: float
-    warmup_steps: Count
+    warmup_updates: Count
     weight_decay: float
     beta_1: float
     beta_2: float
@@ -169,12 +169,12 @@ class Variants:
 
     Attributes:
         reference: The variant that the others are changes of.
-        steps: Updates of each training.
+        updates: Updates of each training.
         variants: By name.
     """
 
     reference: str
-    steps: Count
+    updates: Count
     variants: dict[str, TrainedVariant]
 
 

@@ -32,8 +32,8 @@ VARIANTS = {
 
 def measure(variants, folder, *, dataset, audit, kit):
     """Train and measure variants below one folder."""
-    steps = {"steps": 10, "validation_every": 10}
-    training = kit.POLICY.training.model_copy(update=steps)
+    shorter = {"updates": 10, "validation_every": 10}
+    training = kit.POLICY.training.model_copy(update=shorter)
     plan = TrainingPlan(
         dataset=dataset, settings=kit.POLICY.model_copy(update={"training": training}),
         horizons=kit.HORIZONS, root_seed=2, device="cpu", workers=1, scheduler="local",
@@ -153,5 +153,5 @@ def test_a_variant_without_any_sampler_is_refused(dataset, audit, kit, tmp_path)
 
 def test_steps_are_equal_for_all(measured):
     configs = [read_json(measured / name / "seed_0" / "config.json") for name in VARIANTS]
-    assert {config["training"]["steps"] for config in configs} == {10}
-    assert read_json(measured / "variants.json")["steps"] == 10
+    assert {config["training"]["updates"] for config in configs} == {10}
+    assert read_json(measured / "variants.json")["updates"] == 10

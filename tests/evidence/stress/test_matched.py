@@ -62,7 +62,9 @@ def checkpoints(tmp_path_factory, task, plans, kit):
                 time_features=16, head_parameters=40_000,
             ),
             head=HeadConfig(posterior_width=16),
-            training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
+            training=TrainingConfig(
+                updates=60, batch_size=64, learning_rate=3e-3, warmup_updates=5
+            ),
             sampler=sampler,
             provenance=Provenance(
                 dataset_manifest_sha256="a" * 64, action_contract_sha256="b" * 64,

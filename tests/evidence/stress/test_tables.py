@@ -287,7 +287,7 @@ def test_a_distilled_policy_s_teacher_and_what_it_took_stand_beside_the_comparis
         encoder_width=16, condition_dim=16, trunk_width=16, trunk_blocks=1, time_features=16,
         head_parameters=12_000,
     )  # fmt: skip
-    short = TrainingConfig(steps=4, batch_size=8, validation_every=4)
+    short = TrainingConfig(updates=4, batch_size=8, validation_every=4)
     policies = PolicySettings(network=network, training=short, seeds=[0], fixtures=1)
     plan = TrainingPlan(
         dataset=dataset, settings=policies, horizons=kit.HORIZONS, root_seed=1, device="cpu",

@@ -42,6 +42,6 @@ def test_it_is_drawn_by_the_confidence_judged_by(copied):
 
 def test_a_training_that_was_not_measured_at_three_quarters_is_not_drawn(copied, judged):
     name = "train_generators/flow/seed_0/validation.parquet"
-    evidence.edit_table(copied, name, lambda rows: rows[rows["step"] != 3000])
+    evidence.edit_table(copied, name, lambda rows: rows[rows["updates"] != 3000])
     (picture,) = draw_all(PLOTS, Evidence(copied), judged("B"))
     assert "lacks the loss after" in picture.skipped and not picture.in_words

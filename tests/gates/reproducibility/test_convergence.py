@@ -101,7 +101,7 @@ def test_the_worse_end_over_episodes_decides(ladder):
     """Half of the episodes gain nothing and half much: .08 on average is not below .1."""
     rows = evidence.validation(0.0)
     for row in rows:
-        if row["step"] == evidence.UPDATES and int(row["episode_uuid"][1:]) % 2:
+        if row["updates"] == evidence.UPDATES and int(row["episode_uuid"][1:]) % 2:
             row["loss"] *= 0.84
     path = "train_baselines/act/seed_0/validation.parquet"
     evidence.table(ladder, path, evidence.ValidationRow, rows)
@@ -115,10 +115,10 @@ def test_the_worse_end_over_episodes_decides(ladder):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda rows: [row for row in rows if row["step"] != 3000],
-        lambda rows: [row for row in rows if row["step"] != 4000],
-        lambda rows: [row for row in rows if (row["step"], row["episode_uuid"]) != (3000, "e3")],
-        lambda rows: [{**row, "windows": 32 + (row["step"] == 4000)} for row in rows],
+        lambda rows: [row for row in rows if row["updates"] != 3000],
+        lambda rows: [row for row in rows if row["updates"] != 4000],
+        lambda rows: [row for row in rows if (row["updates"], row["episode_uuid"]) != (3000, "e3")],
+        lambda rows: [{**row, "windows": 32 + (row["updates"] == 4000)} for row in rows],
         lambda rows: [row for row in rows if row["episode_uuid"] == "e3"],
         lambda rows: [{**row, "loss": 0.0} for row in rows],
         lambda rows: [*rows, rows[-1]],

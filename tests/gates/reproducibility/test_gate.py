@@ -82,7 +82,7 @@ def test_the_budget_says_what_a_distilled_candidate_s_training_took(ladder):
 
     def taught(document):
         config = document["methods"]["flow"]["config"]
-        windows = config["training"]["steps"] * config["training"]["batch_size"]
+        windows = config["training"]["updates"] * config["training"]["batch_size"]
         config["distilled"] = {
             "teacher": "diffusion", "teacher_sha256": "c" * 64, "updates": 8000,
             "evaluations": 4 * windows, "gradients": 2 * windows,

@@ -56,7 +56,7 @@ def test_a_training_that_is_not_done_breaks_the_second_rule_on_either_side(
 def test_what_is_neither_shown_nor_refuted_is_neither(ladder):
     """Episodes that fall by nothing and by a fifth: the limit lies inside the interval."""
     rows = [
-        row if row["step"] != evidence.UPDATES or int(row["episode_uuid"][1:]) % 2
+        row if row["updates"] != evidence.UPDATES or int(row["episode_uuid"][1:]) % 2
         else {**row, "loss": row["loss"] * 0.84}
         for row in evidence.validation(0.02)
     ]  # fmt: skip
@@ -68,11 +68,11 @@ def test_what_is_neither_shown_nor_refuted_is_neither(ladder):
 
 def test_another_number_of_updates_breaks_the_first_rule(ladder):
     def longer(document):
-        document["methods"]["flow"]["config"]["training"]["steps"] = 5333
+        document["methods"]["flow"]["config"]["training"]["updates"] = 5333
 
     evidence.edit_document(ladder, "train_generators/matched.json", longer)
     rows = [
-        {**row, "step": {2000: 2000, 3000: 4000, 4000: 5333}[row["step"]]}
+        {**row, "updates": {2000: 2000, 3000: 4000, 4000: 5333}[row["updates"]]}
         for row in evidence.validation()
     ]
     train(ladder, "train_generators", "flow", rows)
@@ -82,7 +82,7 @@ def test_another_number_of_updates_breaks_the_first_rule(ladder):
 
 def test_what_was_not_measured_is_said(ladder):
     train(ladder, "train_baselines", "act",
-          [row for row in evidence.validation() if row["step"] != 3000])  # fmt: skip
+          [row for row in evidence.validation() if row["updates"] != 3000])  # fmt: skip
     assert "equal updates and convergence: not measured" in said_of(ladder)
 
 
