@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 import yaml
 
+from gates.may_differ import PLACE
 from gates.report import GATES, Gate, stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import parse_yaml
@@ -40,6 +41,7 @@ PLANNED: Mapping[str, Planned] = {
     "seed": Planned("", "A"),
     "policy.seeds": Planned("", "A"),
     "policy.training.updates": Planned("", "A"),
+    PLACE: Planned("", "A"),
     "train_generators.samplers": Planned("", "B"),
     "candidates": Planned("", "B"),
     "confidence": Planned(">=", "A"),

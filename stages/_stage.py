@@ -41,8 +41,8 @@ STAGES = (
     "shadow", "gate_c", "wall_clock", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
 SHARED = (
-    "seed", "confidence", "task", "source", "horizons", "compute", "policy", "feasibility",
-    "execution", "rehearsal",
+    "seed", "confidence", "task", "source", "horizons", "compute", "policy", "comparison",
+    "feasibility", "execution", "rehearsal",
 )  # fmt: skip
 
 
@@ -58,7 +58,7 @@ class ComputeSection(Settings):
     Attributes:
         workers: Processes that shards are spread over.
         scheduler: `local` for a Dask cluster on this machine, or the address of a scheduler.
-        device: Torch device of training.
+        device: Torch device of training, and of inference wherever a policy of ours is asked.
     """
 
     workers: int = Field(ge=1, le=256)

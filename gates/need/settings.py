@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from gates.may_differ import PLACE, Listed
 from gates.report import Owner
 from gates.settings import GateSettings, Waiver, waived_question
 
@@ -31,6 +32,7 @@ class NeedSettings(GateSettings):
         remedies: Baselines that learn all demonstrations and still may do without a density.
         one_mode: Baseline that knows the demonstrations of one mode only: shown, and judged by what
             it loses in Gate D.
+        may_differ: Settings that may differ between methods, each with its reason.
         redraws: Candidates that a policy may draw until one is admissible, as in the comparison.
         latent_baseline: Baseline whose latent must answer the observation.
         factors: Factors of which each must have been changed alone.
@@ -46,6 +48,7 @@ class NeedSettings(GateSettings):
         "confidence": "confidence",
         "baselines": "train_baselines.samplers",
         "latent_baseline": "measure_baselines.latent.method",
+        "may_differ": PLACE,
         "redraws": "stress.samples",
     }
 
@@ -57,6 +60,7 @@ class NeedSettings(GateSettings):
     chunked_baseline: str
     remedies: tuple[str, ...] = Field(default=("chunked_l1", "bc_noise"), min_length=1)
     one_mode: str = "one_mode_bc"
+    may_differ: Listed
     redraws: int = Field(ge=1)
     latent_baseline: str
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")

@@ -5,7 +5,6 @@ history would have done; a simple policy covers the modes. Each is one number wi
 """
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -13,6 +12,7 @@ import pandas as pd
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
+from gates.may_differ import unmatched
 from gates.need.settings import (
     MEASURED,
     MEASURED_FACTORS,
@@ -20,7 +20,7 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
-from genpolicy.evidence.documents.given import MATCHED, VARIANTS, TrainedVariant
+from genpolicy.evidence.documents.given import VARIANTS, TrainedVariant
 from genpolicy.evidence.documents.need import LATENT
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 
@@ -33,25 +33,8 @@ MODES = f"{MEASURED}/modes.parquet"
     look_at="Baselines: configurations differ in more than the head; retrain them matched.",
 )
 def baselines_matched(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Settings in which the baselines differ although no whitelist allows it."""
-    return unmatched(evidence, TRAINED, settings.baselines)
-
-
-def unmatched(evidence: Evidence, folder: str, methods: Sequence[str]) -> Measured:
-    """Settings in which methods differ although no whitelist allows it.
-
-    Raises:
-        MissingEvidenceError: A method is not compared.
-    """
-    found = evidence.document(folder, MATCHED)
-    differing, allowed = found.differing_keys, found.whitelist
-    bad = []
-    for method in methods:
-        if method not in differing:
-            raise MissingEvidenceError(f"{folder}/{MATCHED.file} does not compare {method}")
-        bad += [f"{method}.{key}" for key in differing[method] if key not in allowed]
-    text = "; ".join(bad) or f"only whitelisted keys differ ({', '.join(allowed)})"
-    return Measured(float(len(bad)), caveat=text)
+    """Settings in which the baselines differ although nothing allows it."""
+    return unmatched(evidence, TRAINED, settings.baselines, settings.may_differ)
 
 
 @criterion(

@@ -8,8 +8,8 @@ from gates.criterion import Measured, criteria_of, criterion
 from gates.distilled import spent
 from gates.engine import GateSpec, Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
+from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
-from gates.need.simpler import unmatched
 from gates.reproducibility import conformance, convergence, modes, timing
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
@@ -40,14 +40,14 @@ TOTAL = "total"
 def unmatched_keys(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Settings in which the candidate differs although no whitelist allows it."""
+    """Settings in which the candidate differs although nothing allows it."""
     if candidate in settings.brought:
         text = (
             f"{candidate} was trained elsewhere: nothing of its training is matched, and no "
             f"exception is written (gate_b.unmatched.{candidate}: owner, reason, expires)"
         )
         return Measured(1.0, caveat=text)
-    return unmatched(evidence, GENERATORS, (candidate,))
+    return unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
 
 
 @criterion(

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.may_differ import PLACE, Listed
 from gates.report import Owner, StrictModel, parse_section, stage_of
 from gates.settings import CandidateSettings, section_of
 from genpolicy.evidence.rows.reproducibility import NfeRow
@@ -56,6 +57,7 @@ class ReproducibilitySettings(CandidateSettings):
         baselines: Simpler methods that candidates will be compared with.
         device: Torch device on which what is trained here is asked.
         term_deadlines: Of each latency term, what it may take, s, and what is done beyond.
+        may_differ: Settings that may differ between methods, each with its reason.
         budget_reference: Method whose parameter count is the budget.
         mode_minimum_share: Share of the samples of a situation that must be admissible and reach
             a mode, for that mode to be covered.
@@ -66,12 +68,14 @@ class ReproducibilitySettings(CandidateSettings):
         **CandidateSettings.homes,
         "baselines": "stress.baselines",
         "device": "compute.device",
+        "may_differ": PLACE,
         "term_deadlines": "execution.term_deadlines",
     }
 
     baselines: tuple[str, ...] = Field(min_length=1)
     device: str
     term_deadlines: tuple[tuple[str, float, str], ...]
+    may_differ: Listed
     budget_reference: str
     mode_minimum_share: float = Field(gt=0.0, le=0.5)
     unmatched: dict[str, Unmatched] = Field(default_factory=dict)

@@ -1,8 +1,8 @@
 """Training of several methods and seeds on one dataset, and how they differ.
 
-All methods get the same windows, the same encoder and trunk, the same optimisation. What may
-differ is named (`ALLOWED_DIFFERENCES`); every other difference is listed for the gate. A method
-that is defined by its demonstrations (those of one mode) gets fewer windows and as many updates.
+All methods get the same windows, the same encoder and trunk, the same optimisation. Every setting
+in which they differ is listed for the gates, who know what may. A method that is defined by its
+demonstrations (those of one mode) gets fewer windows and as many updates.
 Each checkpoint leaves fixtures: samples that it must give again after reload.
 """
 
@@ -35,10 +35,6 @@ from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 from genpolicy.seeds import integer_seed
 
-ALLOWED_DIFFERENCES = (
-    "method", "sampler.name", "sampler.steps", "sampler.clip", "sampler.eta",
-    "sampler.population", "sampler.tolerance", "sampler.nfe_cap", "training_seed",
-)  # fmt: skip
 DERIVED = ("weights_sha256", "parameters", "training_only_parameters", "flops", "distilled")
 
 
@@ -279,7 +275,7 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
         reference: The method that the others are held against.
 
     Returns:
-        Content of `matched.json`: parameters and FLOPs per part, differing keys, whitelist.
+        Content of `matched.json`: parameters and FLOPs per part, differing keys.
     """
     configs = {method: read_json(folder / CONFIG_FILE) for method, folder in folders.items()}
     methods, differing = {}, {}
@@ -303,7 +299,6 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
         "reference": reference,
         "methods": methods,
         "differing_keys": differing,
-        "whitelist": list(ALLOWED_DIFFERENCES),
         "single_action_keys": list(SINGLE_ACTION_KEYS),
         "one_mode_keys": list(ONE_MODE_KEYS),
     }

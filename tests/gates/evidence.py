@@ -194,6 +194,7 @@ PARAMS: dict[str, Any] = {
     "seed": 1,
     "compute": {"device": "cpu"},
     "confidence": 0.95,
+    "comparison": {"may_differ": [["head", "what is compared"]]},
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "execution": {
         "maximum_age_s": 0.45,
@@ -948,7 +949,6 @@ def _matched(methods: tuple[str, ...], *, dataset: str = "0" * 64) -> dict[str, 
         "reference": methods[0],
         "methods": {m: {**sizes, "config": {**config, "method": m}} for m in methods},
         "differing_keys": {m: ["head"] for m in methods},
-        "whitelist": ["head"],
         "single_action_keys": [],
         "one_mode_keys": [],
     }

@@ -9,7 +9,6 @@ from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.matched_training import (
-    ALLOWED_DIFFERENCES,
     TrainingPlan,
     matched_configuration,
     seed_folders,
@@ -40,12 +39,10 @@ def edit(folder, *path, value):
     write_bytes(folder / CONFIG_FILE, canonical_json(config))
 
 
-def test_matched_methods_differ_in_whitelisted_keys_only(folders):
+def test_matched_methods_differ_in_head_and_sampler_only(folders):
     found = matched_configuration(folders, reference="chunked_bc")
     assert found["differing_keys"]["chunked_bc"] == []
     assert found["differing_keys"]["flow"] == ["method", "sampler.name", "sampler.steps"]
-    assert set(found["differing_keys"]["flow"]) <= set(ALLOWED_DIFFERENCES)
-    assert found["whitelist"] == list(ALLOWED_DIFFERENCES)
     assert set(found["single_action_keys"]) == SINGLE
 
 
@@ -82,7 +79,6 @@ def test_every_other_difference_is_listed(folders, path, value):
     key = ".".join(path)
     found = matched_configuration(folders, reference="chunked_bc")
     assert key in found["differing_keys"]["flow"]
-    assert key not in found["whitelist"]
 
 
 def test_a_key_that_only_one_side_has_is_listed(folders):

@@ -129,7 +129,6 @@ class Matched:
         reference: The method that the others are held against.
         methods: By name.
         differing_keys: Settings in which each method differs from it.
-        whitelist: Settings in which methods may differ.
         single_action_keys: Settings left out for methods that predict one action.
         one_mode_keys: Settings left out for methods trained on one mode.
     """
@@ -137,7 +136,6 @@ class Matched:
     reference: str
     methods: dict[str, MatchedMethod]
     differing_keys: dict[str, list[str]]
-    whitelist: list[str]
     single_action_keys: list[str]
     one_mode_keys: list[str]
 
