@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from genpolicy.candidates.devices import require_here
 from genpolicy.candidates.hosts.hosted import Served
 from genpolicy.candidates.hosts.serving import hosted
 from genpolicy.candidates.judged import loaded_on
 from genpolicy.candidates.wire.connection import LOOPBACK, Listening
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.errors import ConfigError
+from genpolicy.policies.determinism import require_device
 
 INTERRUPTED = 130
 
@@ -20,7 +20,7 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None, device: str) -
         ConfigError: Nobody may listen on that port, or this machine has no such device.
         BadInputError: The checkpoint is missing, malformed, or another one.
     """
-    require_here(device, where="--device")
+    require_device(device, where="--device")
     policy = loaded_on(device, checkpoint, sha256=sha256)
     return _listen(ServedPolicy(policy), policy.method, port)
 

@@ -9,8 +9,12 @@ import torch
 from genpolicy.errors import ConfigError
 
 
-def require_device(device: str) -> None:
-    """Refuse a device that this machine does not have.
+def require_device(device: str, *, where: str = "params.yaml: compute.device") -> None:
+    """Refuse a device that this machine does not have, and say who named it.
+
+    Args:
+        device: Torch device.
+        where: Where it is named.
 
     Raises:
         ConfigError: No such device, or none of this kind.
@@ -24,10 +28,10 @@ def require_device(device: str) -> None:
         count, wanted = 0, torch.device("cpu")
     if not (wanted.index or 0) < count:
         raise ConfigError(
-            where="params.yaml: compute.device",
+            where=where,
             found=f"{device!r}, which this machine does not have",
             expected=f"cpu, or one of {torch.cuda.device_count()} CUDA devices",
-            action="Set `compute.device: cpu`, or run where the device is.",
+            action="Name one of these, or run where the device is.",
         )
 
 

@@ -59,8 +59,11 @@ def test_a_device_that_is_not_there_is_a_bad_setting(device: str) -> None:
 
 def test_without_a_gpu_cuda_is_a_bad_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
-    with pytest.raises(ConfigError, match="'cuda', which this machine does not have"):
+    with pytest.raises(ConfigError, match="'cuda', which this machine does not have") as caught:
         determinism.require_device("cuda")
+    assert caught.value.where == "params.yaml: compute.device"
+    with pytest.raises(ConfigError, match=r"^--device is 'cuda', which .* Name one of these"):
+        determinism.require_device("cuda", where="--device")
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
     determinism.require_device("cuda")
     determinism.require_device("cuda:0")

@@ -94,9 +94,9 @@ class TrainedEntry(HostedEntry):
 
     def require_host(self) -> None:
         """The device that it declares."""
-        from genpolicy.candidates.devices import require_here  # noqa: PLC0415  (loads torch)
+        from genpolicy.policies.determinism import require_device  # noqa: PLC0415  (loads torch)
 
-        require_here(self.device, where=f"declared.device of the candidate {self.name}")
+        require_device(self.device, where=f"declared.device of the candidate {self.name}")
 
 
 class DrawingEntry(HostedEntry):
@@ -228,9 +228,9 @@ class LeRobotEntry(Entry):
 
     def require_host(self) -> None:
         """Its interpreter, and the device that it declares."""
-        from genpolicy.candidates.devices import require_here  # noqa: PLC0415  (loads torch)
+        from genpolicy.policies.determinism import require_device  # noqa: PLC0415  (loads torch)
 
-        require_here(self.device, where=f"declared.device of the candidate {self.name}")
+        require_device(self.device, where=f"declared.device of the candidate {self.name}")
         if not Path(self.interpreter).is_file():
             raise ConfigError(
                 where=f"interpreter of the candidate {self.name}",
