@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field
 
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
+from genpolicy.contract.settings import Settings
 from genpolicy.evidence.documents.given import MATCHED
 
 PLACE = "comparison.may_differ"
@@ -52,6 +53,16 @@ Listed = Annotated[
     AfterValidator(_possible),
 ]
 """Settings that may differ, each with its reason."""
+
+
+class ComparisonSection(Settings):
+    """The shared section `comparison`, as a stage reads it before anything trains.
+
+    Attributes:
+        may_differ: Settings that may differ between methods, each with its reason.
+    """
+
+    may_differ: Listed
 
 
 def unmatched(

@@ -38,7 +38,7 @@ TRAINS, RARELY_S = "train_", 60.0
 STAGES = (
     "task", "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
     "measure_factors", "gate_a", "candidates", "train_generators", "reload", "latency", "gate_b",
-    "shadow", "gate_c", "wall_clock", "stress", "gate_d", "card", "gate_e",
+    "shadow", "gate_c", "wall_clock", "stress", "monitors", "gate_d", "card", "gate_e",
 )  # fmt: skip
 SHARED = (
     "seed", "confidence", "task", "source", "horizons", "compute", "policy", "comparison",

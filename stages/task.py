@@ -4,12 +4,14 @@ It runs every time (`always_changed`): a task may be installed and recordings ma
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
-policy that is brought is not what its entry says, where a method or its sampler is none, and where
-the machine has no such device: before anything trains.
+policy that is brought is not what its entry says, where a method or its sampler is none, where what
+may differ between methods never may, and where the machine has no such device: before anything
+trains.
 """
 
 from pathlib import Path
 
+from gates.may_differ import ComparisonSection
 from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
@@ -32,6 +34,7 @@ def work(params: Params) -> None:
     require_device(params.compute.device)
     refuse_foreign_files()
     require_own_files(Path.cwd())
+    params.section("comparison", ComparisonSection)
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     if brought:
