@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
-from genpolicy.contract.settings import Settings
+from gates.report import StrictModel, parse_section
 from genpolicy.evidence.documents.given import MATCHED
 
 PLACE = "comparison.may_differ"
@@ -55,14 +55,26 @@ Listed = Annotated[
 """Settings that may differ, each with its reason."""
 
 
-class ComparisonSection(Settings):
-    """The shared section `comparison`, as a stage reads it before anything trains.
+class ComparisonSection(StrictModel):
+    """The shared section `comparison`.
 
     Attributes:
         may_differ: Settings that may differ between methods, each with its reason.
     """
 
     may_differ: Listed
+
+
+def require_possible(section: object) -> None:
+    """Refuse a comparison that may never be, before anything trains for it.
+
+    Args:
+        section: `comparison` of `params.yaml`.
+
+    Raises:
+        ConfigError: It breaks the model, or lists what may never differ.
+    """
+    parse_section(ComparisonSection, section, where="params.yaml: comparison")
 
 
 def unmatched(

@@ -11,7 +11,7 @@ trains.
 
 from pathlib import Path
 
-from gates.may_differ import ComparisonSection
+from gates.may_differ import require_possible
 from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
@@ -34,7 +34,7 @@ def work(params: Params) -> None:
     require_device(params.compute.device)
     refuse_foreign_files()
     require_own_files(Path.cwd())
-    params.section("comparison", ComparisonSection)
+    require_possible(params.raw.get("comparison"))
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     if brought:
