@@ -7,7 +7,7 @@ import pytest
 import yaml
 from asked import asked
 
-from gates.may_differ import NEVER, PLACE
+from gates.may_differ import NEVER, PLACE, require_possible
 from gates.need.simpler import baselines_matched
 from gates.proof import SPECS
 from gates.reproducibility.gate import unmatched_keys
@@ -16,6 +16,8 @@ from genpolicy.errors import ConfigError
 from genpolicy.policies.checkpoint import CheckpointConfig
 from genpolicy.policies.matched_training import matched_configuration, seed_folders
 from genpolicy.policies.settings import SamplerConfig, TrainingConfig
+from stages import task
+from stages._stage import load_params
 
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
 SHIPPED = dict(PARAMS["comparison"]["may_differ"])
@@ -110,3 +112,25 @@ def test_methods_that_are_trained_together_differ_only_where_the_shipped_list_al
     found = matched_configuration(folders, reference="chunked_bc")["differing_keys"]
     assert {key for keys in found.values() for key in keys} <= set(SHIPPED)
     assert any(found.values())
+
+
+@pytest.mark.parametrize(
+    ("section", "found"),
+    [
+        ({"may_differ": [[never, "ours learns slowly"]]}, "may never differ") for never in NEVER
+    ]
+    + [(None, "should be an object"), ({"may_differ": [["head"]]}, "reason|items|required")],
+)  # fmt: skip
+def test_a_comparison_that_may_never_be_is_refused_before_anything_trains(section, found):
+    require_possible(PARAMS["comparison"])
+    with pytest.raises(ConfigError, match=rf"params\.yaml: comparison.*({found})"):
+        require_possible(section)
+
+
+def test_the_first_stage_asks_for_it(tmp_path, monkeypatch):
+    impossible = {**PARAMS, "comparison": {"may_differ": [["training.updates", "x"]]}}
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(impossible))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=r"training\.updates may never differ"):
+        task.work(load_params())
+    assert not (tmp_path / "artifacts").exists()
