@@ -110,7 +110,8 @@ def check(
     """Prove the chain.
 
     Exit 0 if every gate up to `--through` passes, 3 if one does not or its
-    report is untrue, 2 if a report or a setting cannot be read. Through E, git
+    report is untrue, 2 if a report or a setting cannot be read, or a limit is
+    overridden by somebody who may not, or no longer. Through E, git
     must show that the plan was committed before the evidence, and that nobody
     but the authors committed to the candidate; 2 where it does not.
 
@@ -118,7 +119,7 @@ def check(
     each that does not hold.
     """
     from gates.card.history import require_history
-    from gates.printed import not_built, page_problem, print_cases, print_rungs, worst
+    from gates.printed import not_built, print_cases, print_rungs, problems_beside, worst
     from gates.proof import prove_all
     from gates.report import GATES
 
@@ -126,7 +127,7 @@ def check(
     every = prove_all(root)
     rungs = every[: GATES.index(last) + 1]
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
-    problems = [page for page in [page_problem(root)] if page]
+    problems = problems_beside(root, rungs)
     if last == "E" and not codes:
         try:
             require_history(root)
@@ -191,7 +192,7 @@ def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
 @gates.command(epilog=examples("genpolicy gates judge A"))
 def judge(letter: Letter, root: Root = Path()) -> int:
     """Judge the evidence here, write the report. A FAIL exits 0 like any verdict."""
-    from gates.proof import decided_text
+    from gates.verdicts import decided_text
     from gates.writing import write_gate
 
     report = write_gate(root, _gate(letter))
@@ -224,9 +225,10 @@ def sign_card(
     candidate, and the evidence must be what its journals say (minutes).
     """
     from gates.card import signing
+    from gates.overriders import require_in_force
     from gates.proof import prove_chain
 
-    prove_chain(root, "D")
+    require_in_force(root, prove_chain(root, "D")[0])
     _require_beneath(root)
     path = signing.sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")

@@ -21,6 +21,7 @@ from gates.doubts_of_evidence import (
     one_seed,
     untried,
 )
+from gates.overrides import OVERRIDDEN
 from gates.preregistration import PREREGISTRATION
 from gates.protection import REHEARSED
 from gates.report import GateReport
@@ -54,7 +55,7 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
     moved limits by the gate that names most of them, which hold for those below it too.
 
     Returns:
-        The first are few, and begin with rehearsal, moved limits, what was waived and clocks that
+        The first are few, and begin with what is overridden, rehearsal, moved limits, what was waived and clocks that
         differ; the second are caveats.
     """
     every = list(reports)
@@ -76,8 +77,15 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
         if any(sign in doubt.text for sign in CLOCKS)
     ]
     waived = [replace(doubt, kind="not asked") for doubt in others if WAIVED.match(doubt.text)]
-    said = {doubt.text for doubt in (*waived, *clocks)}
-    return first + waived + clocks + weighed, [one for one in others if one.text not in said]
+    overridden = [
+        replace(doubt, kind="overridden")
+        for doubt in others
+        if doubt.text.startswith(f"{OVERRIDDEN} ")
+    ]
+    said = {doubt.text for doubt in (*waived, *clocks, *overridden)}
+    return overridden + first + waived + clocks + weighed, [
+        one for one in others if one.text not in said
+    ]
 
 
 def for_a_card(report: GateReport, candidate: str) -> list[str]:

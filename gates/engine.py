@@ -14,6 +14,7 @@ from typing import Any
 
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.overrides import NOBODY, Exceptions, aside, exceptions_of, rule, said
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
 from gates.preregistration import moved_caveats
 from gates.protection import require_protection
@@ -38,7 +39,7 @@ from gates.settings import (
     read_settings,
     waived_criterion,
 )
-from gates.verdicts import combine, first_unmet, judge_criterion, rounded
+from gates.verdicts import first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
@@ -66,7 +67,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Judged:
-    """Answers and verdicts, before the words for them are found; settings as the measures had."""
+    """Answers and verdicts, before the words for them are found; settings as the measures had.
+
+    What is overridden has the verdict that counts, not its own.
+    """
 
     evidence: Evidence
     settings: Any
@@ -115,15 +119,22 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     """
     params = read_params(root)
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
-    said = (*require_protection(params, spec.gate), *moved_caveats(root, params, spec.gate))
+    found = (*require_protection(params, spec.gate), *moved_caveats(root, params, spec.gate))
     limits = read_limits(params, spec.gate, spec.criteria)
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
     evidence = recorded_evidence(root, spec.gate)
-    caveats = (*caveats, *said)
-    report = judge(spec, evidence, limits, settings, candidates=names, caveats=caveats)
+    report = judge(
+        spec,
+        evidence,
+        limits,
+        settings,
+        candidates=names,
+        caveats=(*caveats, *found),
+        exceptions=exceptions_of(root, params, spec.gate),
+    )
     check_record(root, spec.gate, report.materials)
     require_running_code(root)
     return report
@@ -150,6 +161,7 @@ def judge(
     given: object = None,
     candidates: Sequence[str] = (),
     caveats: Sequence[str] = (),
+    exceptions: Exceptions = NOBODY,
 ) -> GateReport:
     """Report of one gate.
 
@@ -162,9 +174,11 @@ def judge(
         given: What the measures take in place of the settings, where a gate knows more.
         candidates: Methods that stand for promotion.
         caveats: Caveats of this run, beside those of the gate.
+        exceptions: Limits that somebody overrides, here and below.
 
     Raises:
         IntegrityError: Evidence that is not what it claims to be.
+        ConfigError: An exception that does not fit its criterion.
     """
     inputs = settings.under(limits) if given is None else given
     answers = []
@@ -175,20 +189,21 @@ def judge(
         names = candidates if item.per_candidate else (None,)
         asked = (name for name in names if not settings.excepted(item.id, name))
         answers += [_answer(item, evidence, inputs, limit, name) for name in asked]
-    verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
+    ruled = rule(exceptions, spec.criteria, answers, limits, candidates=spec.below is not None)
     evidence.bind(*spec.bind)
     lacking = _lacking(evidence)
-    verdict = "INCONCLUSIVE" if lacking and verdict == "PASS" else verdict
-    judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
+    verdict = "INCONCLUSIVE" if lacking and ruled.verdict == "PASS" else ruled.verdict
+    judged = Judged(evidence, inputs, ruled.answers, verdict, ruled.candidates)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
-    said = spec.said(judged) if spec.said else ()
+    shown = spec.said(judged) if spec.said else ()
+    beside = (*_waivers(limits), *settings.caveats, *shown)
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,
         verdict=verdict,
-        candidates=verdicts,
-        criteria=judged.answers,
+        candidates=ruled.candidates,
+        criteria=tuple(answers),
         materials=evidence.materials,
         upstream=upstream_hashes(evidence.root, spec.gate),
         code=dict(evidence.basis.code),
@@ -196,10 +211,11 @@ def judge(
         pipeline=dict(evidence.basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *_waivers(limits), *settings.caveats, *said, *caveats, *lacking),
+        caveats=(*map(said, ruled.overrides), *spec.caveats, *beside, *caveats, *lacking),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
-        decision=decision.text,
+        decision=f"{decision.text} {aside(ruled.overrides)}".strip(),
         promoted=decision.promoted,
+        overrides=ruled.overrides,
     )
 
 

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from gates.overrides import OVERRIDDEN, OVERRIDES, said
 from gates.proof import Rung
 from gates.report import Answer, Gate, GateReport, limit_text, measured_text
 
@@ -19,7 +20,7 @@ class ListedTest:
     Attributes:
         gate: Letter of the gate; empty for what lies beside the gates.
         name: Criterion, with its candidate in brackets; `report` for the report itself.
-        state: `PASS`, or why it does not; as the report says it.
+        state: `PASS`, or why it does not; as the report says it. `OVERRIDDEN` of a limit.
         text: One line for a reader.
         file: Where it stands, relative to the repository.
         blocks: Whether it keeps the ladder from passing. What stopped a candidate beside one that
@@ -93,6 +94,9 @@ def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
     if rung.verdict in ("NOT JUDGED", "REFUSED") or report is None:
         yield ListedTest(rung.gate, "report", rung.verdict, rung.note, rung.report, blocks=True)
         return
+    for entry in report.overrides:
+        name = f"overridden: {entry.criterion}"
+        yield ListedTest(rung.gate, name, OVERRIDDEN, said(entry), OVERRIDES, blocks=False)
     passes = rung.verdict == "PASS"
     for answer in report.criteria:
         name = f"{answer.id} ({answer.candidate})" if answer.candidate else answer.id

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from gates.overrides import OVERRIDDEN
 from gates.report import GATES, NAMES, Answer, Gate, GateReport, limit_text, measured_text
 
 NOT_JUDGED = "NOT JUDGED"
@@ -89,8 +90,13 @@ def moved_text(gates: list[Moved]) -> str:
             shown = ", ".join(keys[:MOST_NAMED])
             more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
             lines.append(f"   {'because?':<10} {name}: {shown}{more}")
-        lines += [f"   {'caveat':<10} {caveat}" for caveat in gate.caveats]
+        lines += [f"   {_label(caveat):<10} {caveat}" for caveat in gate.caveats]
     return "\n".join(lines)
+
+
+def _label(caveat: str) -> str:
+    """What a caveat is about: an exception to a limit stands out among the others."""
+    return OVERRIDDEN if caveat[2:].startswith(f"{OVERRIDDEN} ") else "caveat"
 
 
 def _of_gate(gate: Gate, old: GateReport | None, new: GateReport | None) -> Moved:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gates.for_ci import as_github, as_junit, beside, cases
+from gates.overriders import require_in_force
+from gates.overrides import OVERRIDES
 from gates.proof import Rung
 from gates.report import read_report
 from gates.writing import INDEX, changed_page
@@ -50,6 +52,22 @@ def pages_code(root: Path) -> set[int]:
         return set()
     print(problem[1], file=sys.stderr)
     return {problem[3]}
+
+
+def problems_beside(root: Path, rungs: Sequence[Rung]) -> list[Problem]:
+    """What blocks although every gate passes: a page, a limit that is overridden no longer.
+
+    Args:
+        root: Repository root.
+        rungs: The gates that are asked for, as proved.
+    """
+    found = [page_problem(root)]
+    proved = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
+    try:
+        require_in_force(root, {gate: read_report(root, gate)[0] for gate in proved[-1:]})
+    except GenpolicyError as error:
+        found.append(("override", str(error), OVERRIDES, error.exit_code))
+    return [problem for problem in found if problem is not None]
 
 
 def page_problem(root: Path) -> Problem | None:

@@ -15,6 +15,7 @@ from gates.differences import first_difference
 from gates.engine import GateSpec, judge_gate
 from gates.feasibility import gate as feasibility
 from gates.need import gate as need
+from gates.overriders import require_in_force
 from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
 from gates.report import (
     GATES,
@@ -30,7 +31,7 @@ from gates.report import (
 )
 from gates.reproducibility import gate as reproducibility
 from gates.stress import gate as stress
-from gates.verdicts import first_unmet
+from gates.verdicts import decided_by, decided_text
 from genpolicy.errors import ConfigError, GenpolicyError, IntegrityError, RefusedError
 from genpolicy.integrity.hashing import sha256_file
 
@@ -145,7 +146,8 @@ def admit(stage: str, root: Path) -> Admission:
         root: Repository root.
 
     Raises:
-        ConfigError: No such stage, or `params.yaml` is wrong.
+        ConfigError: No such stage, `params.yaml` is wrong, or a limit is overridden by somebody
+            who may not, or no longer.
         IntegrityError: A report is malformed or of another schema version; run its gate again.
         RefusedError: A report is missing, untrue, or not PASS.
     """
@@ -157,7 +159,9 @@ def admit(stage: str, root: Path) -> Admission:
             action="Register the stage in gates.proof.STAGE_REQUIRES.",
         )
     needed = STAGE_REQUIRES[stage]
-    return Admission(stage, *(prove_chain(root, needed) if needed else ({}, {})))
+    reports, hashes = prove_chain(root, needed) if needed else ({}, {})
+    require_in_force(root, reports)
+    return Admission(stage, reports, hashes)
 
 
 def prove_chain(root: Path, through: Gate) -> tuple[dict[Gate, GateReport], dict[Gate, str]]:
@@ -208,15 +212,6 @@ def prove_all(root: Path) -> list[Rung]:
     return rungs
 
 
-def decided_text(report: GateReport) -> str:
-    """The criterion that decided, in one phrase; empty after PASS."""
-    decided = first_unmet(report.criteria, report.verdict)
-    if decided is None:
-        return ""
-    of = f" ({decided.candidate})" if decided.candidate else ""
-    return f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
-
-
 def verify_report(
     root: Path,
     gate: Gate,
@@ -259,7 +254,7 @@ def require_pass(gate: Gate, report: GateReport) -> None:
     """
     if report.verdict == "PASS":
         return
-    decided = first_unmet(report.criteria, report.verdict)
+    decided = decided_by(report)
     if decided is None:
         raise _refused(gate, "verdict", report.verdict, "PASS", report.decision)
     name = f"{decided.id}({decided.candidate})" if decided.candidate else decided.id

@@ -76,14 +76,49 @@ class Answer(StrictModel):
     counted: str
 
 
+class Overridden(StrictModel):
+    """A limit that somebody let be looser for a while, and what it would have been without.
+
+    Attributes:
+        gate: Whose limit it is.
+        criterion: Of that gate.
+        candidate: Of whom it is asked; None for the whole gate.
+        comparison: How what is measured must stand to the limit.
+        threshold: The limit of `params.yaml`.
+        limit: What stands in its place.
+        by: Who did so, by the identifier on `reviewers.yaml`.
+        reason: Why.
+        expires: Last day on which it holds, YYYY-MM-DD.
+        verdict: Of the criterion by its own limit; None where it was not asked.
+        instead: Of the criterion by the looser limit; likewise.
+        without: Of the gate, had nobody overridden anything.
+    """
+
+    gate: Gate
+    criterion: str
+    candidate: str | None
+    comparison: Comparison
+    threshold: float
+    limit: float
+    by: str
+    reason: str
+    expires: str
+    verdict: Verdict | None
+    instead: Verdict | None
+    without: Verdict
+
+
 class GateReport(StrictModel):
     """The answer of one gate.
 
     Attributes:
         schema_version: Version of this model.
-        verdict: Follows from the criteria by `gates.verdicts.combine`.
+        verdict: Follows from the criteria by `gates.verdicts.combine`, those that are overridden
+            by the looser limit.
         candidates: Verdict of each method that stands for promotion (gates B to E).
-        criteria: In the order in which a failure is diagnosed.
+        criteria: In the order in which a failure is diagnosed; each by its own limit, overridden
+            or not.
+        overrides: Limits that somebody overrides, of this gate and of those below.
         materials: SHA-256 of every file read or bound, by path relative to the repository.
         upstream: SHA-256 of the reports below this one, by gate.
         code: SHA-256 of the code that the gate and its evidence stages depend on, by package.
@@ -113,6 +148,7 @@ class GateReport(StrictModel):
     diagnosis: str
     decision: str
     promoted: str | None
+    overrides: tuple[Overridden, ...] = ()
 
 
 def measured_text(answer: Answer) -> str:

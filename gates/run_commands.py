@@ -44,8 +44,8 @@ def diff(
 ) -> int:
     """What moved between two runs, and what may be why; proves nothing.
 
-    Per gate: its verdict, criteria that turned, limits that were loosened or
-    tightened, numbers, then which code, parameters and evidence are other ones.
+    Per gate: its verdict, criteria that turned, limits that were loosened,
+    tightened or overridden, numbers, then which code, parameters and evidence are other ones.
     Exit 0 whatever moved.
     """
     from gates.moved import moved, moved_text
@@ -81,6 +81,30 @@ def status(root: Root = Path(), as_json: AsJson = False) -> int:
         print_document(asdict(found))
     else:
         print(status_text(found))
+    return 0
+
+
+@report.command(
+    "limits", epilog=examples("genpolicy report limits", "genpolicy report limits --json")
+)
+def limits(root: Root = Path(), as_json: AsJson = False) -> int:
+    """Which limits moved after their evidence was there, and by whom.
+
+    Asks git: each commit that loosened, tightened or changed what a gate judges
+    by, after it could have seen what it judges; what is not committed; and who
+    committed each exception of overrides.yaml. Without a history it says that
+    nobody knows. Exit 0 whatever moved.
+    """
+    from dataclasses import asdict
+
+    from gates.change_control import control_of, control_text
+    from gates.printed import print_document
+
+    found = control_of(root)
+    if as_json:
+        print_document(asdict(found))
+    else:
+        print(control_text(found))
     return 0
 
 

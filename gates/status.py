@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from gates.change_control import control_of
 from gates.git import git
 from gates.moved import Moved, moved, moved_text
 from gates.overview import TIMES, overview
@@ -51,6 +52,7 @@ class Status:
         ran: When the newest of its stages ended here, and how long all took.
         committed: Which commit holds the reports, from when and by whom.
         proved: What a proof of every byte says now, by gate.
+        limits: How many moved after their evidence was there, and how many are overridden.
         reviewed: The last reviewed run.
     """
 
@@ -60,6 +62,7 @@ class Status:
     ran: str
     committed: str
     proved: Mapping[str, str]
+    limits: str
     reviewed: Reviewed
 
 
@@ -86,6 +89,7 @@ def status_of(root: Path, rungs: list[Rung]) -> Status:
         ran=_ran(root, rungs),
         committed=_committed(root),
         proved={rung.gate: _proved(rung) for rung in rungs},
+        limits=_limits(root),
         reviewed=_reviewed(root, reports),
     )
 
@@ -99,6 +103,7 @@ def status_text(status: Status) -> str:
         f"ran        {status.ran}",
         f"committed  {status.committed}",
         *(f"proved {gate}   {said}" for gate, said in status.proved.items()),
+        f"limits     {status.limits}",
         f"reviewed   {status.reviewed.said}",
     ]
     if status.reviewed.moved:
@@ -131,6 +136,19 @@ def _proved(rung: Rung) -> str:
     if rung.verdict == "NOT JUDGED":
         return "not judged"
     return f"now, {rung.verdict}: every byte is as the report says"
+
+
+def _limits(root: Path) -> str:
+    """Who moved what stands at length elsewhere."""
+    try:
+        control = control_of(root)
+    except GenpolicyError as error:
+        return f"unknown: {error}"
+    known = f"{len(control.shifted)} moved after their evidence"
+    if control.unknown:
+        known = f"who moved one is unknown, {control.unknown}"
+    overridden = f", {len(control.overrides)} OVERRIDDEN" if control.overrides else ""
+    return f"{known}{overridden}; by whom: `genpolicy report limits`"
 
 
 def _reviewed(root: Path, reports: Mapping[Gate, GateReport]) -> Reviewed:

@@ -7,7 +7,7 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.report import Answer, Comparison, Verdict
+from gates.report import Answer, Comparison, GateReport, Verdict, limit_text, measured_text
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
 SIGNIFICANT_DIGITS = 12
@@ -95,3 +95,31 @@ def first_unmet(criteria: Sequence[Answer], verdict: Verdict) -> Answer | None:
     unmet = [c for c in criteria if c.verdict == verdict]
     common = [c for c in unmet if c.candidate is None]
     return next(iter(common or unmet), None)
+
+
+def decided_by(report: GateReport) -> Answer | None:
+    """The criterion that decided a report; none that somebody overrides decides anything.
+
+    Returns:
+        None after PASS, and where nothing was asked.
+    """
+    return first_unmet(counting(report), report.verdict)
+
+
+def decided_text(report: GateReport) -> str:
+    """The criterion that decided, in one phrase; empty after PASS."""
+    decided = decided_by(report)
+    if decided is None:
+        return ""
+    of = f" ({decided.candidate})" if decided.candidate else ""
+    return f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
+
+
+def counting(report: GateReport) -> list[Answer]:
+    """Criteria by which the verdict is found: without those that hold by a looser limit only."""
+    spared = {
+        (entry.criterion, entry.candidate)
+        for entry in report.overrides
+        if entry.gate == report.gate and entry.instead == "PASS"
+    }
+    return [c for c in report.criteria if c.verdict == "PASS" or (c.id, c.candidate) not in spared]

@@ -7,6 +7,7 @@ one. `python -m gates.writing` prints the ladder's first page once more.
 import contextlib
 from pathlib import Path
 
+from gates.overriders import require_written
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
 from gates.pipeline import LOCK, stages_of
@@ -25,12 +26,14 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
     A FAIL is a result like any other and raises nothing.
 
     Raises:
-        ConfigError: The section of `params.yaml` is missing or wrong.
+        ConfigError: The section of `params.yaml` is missing or wrong, or a limit is overridden by
+            somebody who may not, or no longer.
         BadInputError: Evidence that is not what it claims to be, or an unwritable place.
     """
     base = root / report_path(gate)
     _remove(base)
     write_index(root)
+    require_written(root)
     report = judge(root, gate)
     write_bytes(base.with_suffix(".html"), gate_page(root, report).encode())
     write_bytes(base.with_suffix(".md"), markdown(report).encode())

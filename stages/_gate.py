@@ -44,6 +44,7 @@ def _metrics(report: GateReport) -> dict[str, object]:
     return {
         "verdict": str(report.verdict),
         "passes": int(report.verdict == "PASS"),
+        "overridden": len(report.overrides),
         "candidates": {method: str(verdict) for method, verdict in report.candidates.items()},
         "criteria": {
             _name(item): {

@@ -14,6 +14,7 @@ from pathlib import Path
 from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
 from gates.card.signing import read_draft
 from gates.git import git
+from gates.overrides import OVERRIDES, Override, entries_of, placed
 from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION, asked_by
 from gates.report import GATES, Gate
@@ -21,6 +22,7 @@ from gates.reproducibility.settings import BROUGHT_FOLDER
 from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.documents.brought import BROUGHT
 from genpolicy.integrity.documents import parse_yaml, read_yaml
+from genpolicy.integrity.hashing import sha256_bytes_of
 
 MADE = (
     "task", "record", "ingest", "train_baselines", "train_factors", "candidates",
@@ -38,6 +40,7 @@ MAKERS = "a <%ae>%nc <%ce>%n%(trailers:key=Co-authored-by,valueonly,unfold,separ
 FORGE = "noreply@github.com"
 """Commits what is merged by a button; nobody's own address."""
 PLAN_FIRST = "Plan, commit, run, commit, and have it reviewed by somebody else; then sign."
+SAY_SO = f"Whoever overrides a limit commits the entry of {OVERRIDES} with their own hands."
 NAME_ALL = (
     f"Name all who made it in `card.authors`, by their addresses on {ALLOW_LIST}; let others sign."
 )
@@ -46,9 +49,11 @@ NAME_ALL = (
 def require_history(root: Path) -> None:
     """Require of the draft below `root` that its plan came first and its makers are its authors.
 
+    And that whoever overrides a limit has said so in a commit of their own.
+
     Raises:
-        IntegrityError: As `require_registered_first`, `require_makers_known` and
-            `require_author_of_brought`.
+        IntegrityError: As `require_registered_first`, `require_makers_known`,
+            `require_author_of_brought` and `require_said_by_themselves`.
         BadInputError: The draft is missing or malformed.
         ConfigError: A malformed allow-list.
     """
@@ -56,6 +61,7 @@ def require_history(root: Path) -> None:
     draft, allowed = read_draft(root), load_allow_list(root)
     require_makers_known(root, draft.authors, allowed)
     require_author_of_brought(root, draft.candidate, draft.authors, allowed)
+    require_said_by_themselves(root, allowed)
 
 
 def require_registered_first(root: Path) -> None:
@@ -73,13 +79,13 @@ def require_registered_first(root: Path) -> None:
     _require_whole(root)
     if git(root, "diff", "--quiet", "HEAD", "--", PREREGISTRATION) is None:
         _refuse(PREREGISTRATION, "not committed as it lies here", "committed before the evidence")
-    digests, versions = _evidence_digests(root), _versions(root)
+    digests, versions = evidence_digests(root), _versions(root)
     if not versions:
         _refuse(PREREGISTRATION, "not committed", "committed before the evidence")
     after = {gate: _after(root, versions, gate) for gate in RUNGS}
     for stage, gate in MEASURED.items():
         evidence, digest = f"artifacts/{stage}", digests.get(stage)
-        brought = _brought(root, digest) if digest else set()
+        brought = commits_of(root, digest) if digest else set()
         if not brought:
             _refuse(f"{LOCK}: {evidence}", "not committed", "committed after the plan")
         if not brought <= after[gate]:
@@ -148,6 +154,53 @@ def require_author_of_brought(
         _refuse(f"the candidate {candidate}", found, expected, NAME_ALL)
 
 
+def require_said_by_themselves(root: Path, allowed: AllowList) -> None:
+    """Require that each exception to a limit was committed by the person whom it names.
+
+    Args:
+        root: Repository root.
+        allowed: The allow-list; everybody on it needs an address.
+
+    Raises:
+        IntegrityError: No git history or not all of it, exceptions that are not committed, or one
+            that was brought by somebody else.
+        ConfigError: The file is malformed.
+    """
+    path = root / OVERRIDES
+    entries = entries_of(sha256_bytes_of(path, keep=True)[1]) if path.is_file() else ()
+    if not entries:
+        return
+    _require_whole(root)
+    if git(root, "diff", "--quiet", "HEAD", "--", OVERRIDES) is None:
+        _refuse(OVERRIDES, "not committed as it lies here", "committed by whom it names", SAY_SO)
+    for entry, commit in brought_by(root, entries):
+        person = allowed.find(entry.by)
+        own = {mail.casefold() for mail in person.emails} if person else set()
+        makers = _addresses(git(root, "log", "-1", f"--format={MAKERS}", commit) or "")
+        if not commit or not own & set(makers):
+            found = f"committed by {', '.join(makers)}" if commit else "in no commit"
+            _refuse(placed(entry), found, f"a commit of {entry.by}, whom it names", SAY_SO)
+
+
+def brought_by(root: Path, entries: Sequence[Override]) -> list[tuple[Override, str]]:
+    """Each exception with the commit that brought it as it stands; empty where none did."""
+    commits = (git(root, "log", "--format=%H", "--", OVERRIDES) or "").split()
+    versions = [(commit, _exceptions_at(root, commit)) for commit in commits]
+    found = []
+    for entry in entries:
+        lacking = next((n for n, (_, held) in enumerate(versions) if entry not in held), None)
+        holding = [commit for commit, _ in versions[:lacking]]
+        found.append((entry, holding[-1] if holding else ""))
+    return found
+
+
+def _exceptions_at(root: Path, commit: str) -> tuple[Override, ...]:
+    try:
+        return entries_of((git(root, "show", f"{commit}:./{OVERRIDES}") or "").encode())
+    except GenpolicyError:
+        return ()  # what could not be read overrode nothing
+
+
 def _no_author(mail: str, authors: Sequence[str], allowed: AllowList) -> str:
     """Whose address it is, where it is none of the authors'; empty where it is.
 
@@ -197,13 +250,13 @@ def _after(root: Path, versions: Sequence[tuple[str, dict[str, object]]], gate: 
     return {*(git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
 
 
-def _brought(root: Path, digest: str) -> set[str]:
+def commits_of(root: Path, digest: str) -> set[str]:
     """Commits that brought a hash into the lock file or took it out, on whatever branch."""
     found = git(root, "log", "--full-history", "-m", "--format=%H", f"-S{digest}", "--", LOCK)
     return {*(found or "").split()}
 
 
-def _evidence_digests(root: Path) -> dict[str, str]:
+def evidence_digests(root: Path) -> dict[str, str]:
     """Hash of the evidence of each stage, as the lock file records it; none where it does not."""
     lock = read_yaml(root / LOCK)
     stages = lock.get("stages") if isinstance(lock, dict) else None
@@ -215,15 +268,21 @@ def _evidence_digests(root: Path) -> dict[str, str]:
     return digests
 
 
-def _require_whole(root: Path) -> None:
-    """Require a repository of git whose history goes back to its beginning."""
+def unknown_history(root: Path) -> tuple[str, str]:
+    """Why git cannot say what came first, and what it takes; both empty where it can."""
     cut = git(root, "rev-parse", "--is-shallow-repository")
     if cut is None:
-        expected = "one that says what was committed first, and by whom"
-        _refuse("the repository", "without git history", expected)
+        return "without git history", "one that says what was committed first, and by whom"
     if cut != "false":
-        expected = "the whole history (`git fetch --unshallow`)"
-        _refuse("the repository", "a shallow clone", expected)
+        return "a shallow clone", "the whole history (`git fetch --unshallow`)"
+    return "", ""
+
+
+def _require_whole(root: Path) -> None:
+    """Require a repository of git whose history goes back to its beginning."""
+    found, expected = unknown_history(root)
+    if found:
+        _refuse("the repository", found, expected)
 
 
 def _refuse(where: str, found: str, expected: str, action: str = PLAN_FIRST) -> None:

@@ -7,7 +7,7 @@ import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -37,6 +37,8 @@ from gates.card.windows import require_aborts, windows_of
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.overriders import first_end, require_in_force
+from gates.overrides import OVERRIDES, Exceptions, exceptions_of
 from gates.pipeline import check_record
 from gates.preregistration import PREREGISTRATION, moved_caveats
 from gates.protection import require_protection
@@ -81,7 +83,8 @@ class Dossier:
         papers: The draft and the envelope.
         chain_error: Why gates A to D, or the draft, do not hold; empty if they do.
         today: Day of the judgement, UTC.
-        excepted_until: Last day of the exception by which the candidate stands; empty without one.
+        excepted_until: Last day of the exceptions by which the candidate stands, the first that
+            ends; empty without one.
     """
 
     settings: CardGateSettings
@@ -107,19 +110,34 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     settings = read_settings(params, stage_of("E"), CardGateSettings)
     caveats = (*require_protection(params, "E"), *moved_caveats(root, params, "E"))
     papers = examine(root, settings.card)
-    error = chain.error or _chain_error(root, chain, papers.draft)
-    until = excepted_until(params, papers.draft.candidate) if papers.draft else ""
-    dossier = Dossier(settings, papers, error, today or utc_today(), until)
+    exceptions = exceptions_of(root, params, "E")
+    day = today or utc_today()
+    error = chain.error or _chain_error(root, chain, papers.draft, day)
+    until = _until(params, papers.draft, exceptions)
+    dossier = Dossier(settings, papers, error, day, until)
     limits = read_limits(params, "E", GATE.criteria)
     evidence = recorded_evidence(root, "E")
-    report = judge(GATE, evidence, limits, settings, given=dossier, caveats=caveats)
+    report = judge(
+        GATE, evidence, limits, settings, given=dossier, caveats=caveats, exceptions=exceptions
+    )
     check_record(root, "E", report.materials)
     require_running_code(root)
     return report
 
 
-def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
+def _until(params: Mapping[str, Any], draft: TrialCard | None, exceptions: Exceptions) -> str:
+    """The day on which the first exception ends, of matching or of a limit; empty without one."""
+    if draft is None:
+        return ""
+    name = draft.candidate
+    return min(
+        filter(None, (excepted_until(params, name), first_end(exceptions.below, name))), default=""
+    )
+
+
+def _chain_error(root: Path, chain: Chain, draft: TrialCard | None, day: datetime.date) -> str:
     try:
+        require_in_force(root, chain.reports, day)
         candidate = promoted(chain.reports["D"])
         if draft is None:
             return f"{DRAFT_PATH} is missing or malformed"
@@ -290,6 +308,7 @@ GATE = GateSpec(
         DRAFT_PATH,
         ENVELOPE_FILE,
         PREREGISTRATION,
+        OVERRIDES,
         f"{CARDS}/*.dsse.json",
         ALLOW_LIST,
         "reports/gate_[a-d].json",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from gates.change_control import control_of, control_text
 from gates.git import git
 from gates.package.archive import write_archive
 from gates.package.contents import brought, files_of_the_run
@@ -71,6 +72,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
             groups=groups,
             files={name: _file(root / name) for name in files_to_carry(root, groups)},
             statements={gate: sha256_bytes(data) for gate, data in statements.items()},
+            limits=control_text(control_of(root)).splitlines(),
         )
     except ValidationError as error:
         raise BadInputError(

@@ -71,4 +71,6 @@ def verify_bundle(
     if not as_json and not codes:
         print(f"{index.candidate}: all {len(index.files)} files are what the address names.")
         print(f"Address {index.address}")
+        print("Limits, as git said where it was packaged; nothing here derives it again:")
+        print("\n".join(f"  {line}" for line in index.limits))
     return worst(codes)

@@ -8,6 +8,7 @@ said by the reader's own allow-list, never by one that comes with what was signe
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
+from gates.overrides import OVERRIDES
 from gates.pipeline import (
     CODE,
     IGNORED,
@@ -25,7 +26,7 @@ from gates.settings import read_params, section_of
 from genpolicy.candidates.brought import BroughtPolicy, read_brought
 from genpolicy.errors import ConfigError
 
-SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, "fixtures.yaml")
+SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, OVERRIDES, "fixtures.yaml")
 LAST = GATES[-1]
 OF_THE_CARD = (*RUNGS[LAST], stage_of(LAST))
 """Stages whose outputs stay behind."""

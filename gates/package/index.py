@@ -60,6 +60,8 @@ class BundleIndex(StrictModel):
         groups: The eleven groups.
         files: Every file that the verdicts rest on, by path from the root of the workspace.
         statements: SHA-256 of the statement of each gate.
+        limits: What git said, where it was packaged, of limits that moved after their evidence and
+            of those that are overridden; a bundle has no history to derive it from again.
     """
 
     schema_version: Literal[1]
@@ -70,6 +72,7 @@ class BundleIndex(StrictModel):
     groups: list[BundledGroup]
     files: dict[str, BundledFile]
     statements: dict[Gate, Sha256]
+    limits: list[str]
 
     @model_validator(mode="after")
     def _paths(self) -> Self:

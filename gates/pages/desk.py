@@ -4,14 +4,14 @@ Everything follows from the reports alone, so that the page is the same wherever
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gates.closeness import Closeness, by_room, closeness
 from gates.doubt import Doubt
 from gates.doubts import of_a_ladder
 from gates.pages.numbers import at_its_end, human, judged_at
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
-from gates.verdicts import first_unmet
+from gates.verdicts import decided_by
 
 HEADLINES: dict[Gate, tuple[str, str]] = {
     "A": ("multimodal_situations", "held-out situations in which more than one way is taken"),
@@ -49,6 +49,7 @@ class Box:
         verdict: Of its report; `NOT JUDGED` where none lies there.
         number: As a person reads it; empty where nothing was measured.
         of: What it is a number of.
+        overridden: Whether somebody overrides a limit of it, or of a gate below.
     """
 
     gate: Gate
@@ -56,6 +57,7 @@ class Box:
     verdict: str
     number: str
     of: str
+    overridden: bool = False
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,10 @@ def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
     doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
     return Desk(
         asked=_asked(reports),
-        boxes=tuple(_box(gate, reports.get(gate)) for gate in GATES),
+        boxes=tuple(
+            replace(_box(gate, reports.get(gate)), overridden=_overridden(reports.get(gate)))
+            for gate in GATES
+        ),
         doubts=tuple(doubts),
         not_shown=tuple(not_shown),
         bars=tuple(sorted(bars, key=lambda bar: -bar.near.used)),
@@ -165,7 +170,7 @@ def _asked(reports: Mapping[Gate, GateReport]) -> Asked:
     title = f"Nothing is asked of you yet: the ladder stops at gate {stopped}, {NAMES[stopped]}"
     if report is None:
         return Asked(title, "It was not judged: `make ladder`.", "")
-    decided = first_unmet(report.criteria, report.verdict)
+    decided = decided_by(report)
     found = f"{decided.question} {_against(decided)} " if decided is not None else ""
     return Asked(title, f"{found}{report.diagnosis or report.decision}", "")
 
@@ -198,6 +203,10 @@ def _box(gate: Gate, report: GateReport | None) -> Box:
         return Box(gate, NAMES[gate], report.verdict, next(iter(texts.values())), of)
     each = ", ".join(f"{candidate} {text}" for candidate, text in texts.items())
     return Box(gate, NAMES[gate], report.verdict, each, of)
+
+
+def _overridden(report: GateReport | None) -> bool:
+    return report is not None and bool(report.overrides)
 
 
 def _part(owner: str, reports: Mapping[Gate, GateReport]) -> Part:

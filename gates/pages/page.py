@@ -17,6 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from gates.card.card import DRAFT_PATH, TrialCard
 from gates.card.papers import examine
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.overrides import said
 from gates.pages import (
     plots_convergence,
     plots_density,
@@ -126,6 +127,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         identities=identities(Evidence(root), report),
         card=card,
         card_state=state,
+        overridden=[said(entry) for entry in report.overrides],
         digest=sha256_bytes(report_bytes(report)),
     )
 
@@ -190,6 +192,7 @@ def index_page(root: Path) -> str:
         current="",
         rows=rows,
         desk=desk_of(reports),
+        overridden=list(dict.fromkeys(said(e) for r in reports.values() for e in r.overrides)),
         line=line_of(reports, evidence, card_of(papers)),
         gain=gain_of(reports, evidence),
         clips=clips_of(reports, evidence),

@@ -2,8 +2,9 @@
 
 import re
 
+from gates.overrides import OVERRIDDEN, said
 from gates.pages.guide import unit
-from gates.pages.table import deciding, not_asked, passed_by, sign, stops, tally, waived
+from gates.pages.table import deciding, not_asked, overridden, passed_by, sign, stops, tally, waived
 from gates.report import NAMES, Answer, GateReport, limit_text, measured_text, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
@@ -19,8 +20,9 @@ def markdown(report: GateReport) -> str:
     """Verdict on top, then what decided it, the open criteria, all criteria, the caveats."""
     lines = [
         f"# Gate {report.gate}, {NAMES[report.gate]}: {MARKS[report.verdict]} "
-        f"{plain(report.verdict.replace('_', ' '))}",
+        f"{plain(report.verdict.replace('_', ' '))}{f', {OVERRIDDEN}' * bool(report.overrides)}",
         "",
+        *(line for one in report.overrides for line in (f"✕ **{plain(said(one))}**", "")),
         f"**Decision:** {plain(report.decision)}",
         "",
     ]
@@ -61,7 +63,8 @@ def _row(c: Answer, report: GateReport) -> str:
     interval = f"{c.interval[0]:.6g} to {c.interval[1]:.6g}" if c.interval else ""
     after = f" {unit(c.id)}" if unit(c.id) else ""
     measured = f"{c.measured:.6g}{after}" if c.measured is not None else measured_text(c)
-    note = f" ({waived(c, report)})" if waived(c, report) else ""
+    aside = waived(c, report) or overridden(c, report)
+    note = f" ({aside})" if aside else ""
     cells = (
         f"{MARKS[c.verdict]} {c.verdict.replace('_', ' ')}{note}",
         c.id,

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
+from gates.overrides import overridden_here
 from gates.pages.numbers import human, limit_said
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
-from gates.verdicts import first_unmet
+from gates.verdicts import counting, decided_by
 
 
 @dataclass(frozen=True)
@@ -17,10 +18,12 @@ class Line:
     Attributes:
         criterion: What was judged.
         waived: Why it does not count although it is not met; empty if it counts.
+        overridden: Who holds it to another limit; empty where nobody does.
     """
 
     criterion: Answer
     waived: str
+    overridden: str = ""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def groups(report: GateReport) -> list[Group]:
     for name, members in groupby(report.criteria, key=lambda c: c.id):
         same = list(members)
         first = same[0]
-        lines = tuple(Line(c, waived(c, report)) for c in same)
+        lines = tuple(Line(c, waived(c, report), overridden(c, report)) for c in same)
         found.append(
             Group(
                 first.question,
@@ -76,11 +79,20 @@ def groups(report: GateReport) -> list[Group]:
 
 def waived(criterion: Answer, report: GateReport) -> str:
     """Why an unmet criterion does not stand in the way; empty if it does."""
-    if criterion.verdict != "FAIL":
+    if criterion.verdict != "FAIL" or overridden_here(criterion, report):
         return ""
     if criterion.candidate is not None and report.verdict == "PASS":
         return f"stops {criterion.candidate} only"
     return ""
+
+
+def overridden(criterion: Answer, report: GateReport) -> str:
+    """Who holds a criterion to another limit than its own, and until when; empty if nobody does."""
+    entry = overridden_here(criterion, report)
+    if entry is None:
+        return ""
+    limit = f"{sign(entry.comparison)} {human(criterion, entry.limit)}"
+    return f"overridden: {entry.instead} by {limit}, by {entry.by} until {entry.expires}"
 
 
 def not_asked(report: GateReport) -> tuple[str, ...]:
@@ -104,6 +116,8 @@ def tally(report: GateReport) -> str:
         texts.append(f"{absent} not measured")
     if waiting := _count(report, "PENDING_REVIEW"):
         texts.append(f"{waiting} {'waits' if waiting == 1 else 'wait'} for a person")
+    if aside := sum(bool(overridden(c, report)) for c in report.criteria):
+        texts.append(f"{aside} overridden")
     return "; ".join(texts)
 
 
@@ -113,7 +127,7 @@ def _count(report: GateReport, verdict: str) -> int:
 
 def deciding(report: GateReport) -> str:
     """What decided a verdict other than PASS, in one phrase; empty after PASS."""
-    decided = first_unmet(report.criteria, report.verdict)
+    decided = decided_by(report)
     if decided is None:
         return ""
     of = f" of {decided.candidate}" if decided.candidate else ""
@@ -131,7 +145,7 @@ def stops(report: GateReport) -> dict[str, str]:
     """For each candidate that does not pass: the first criterion that it does not meet."""
     found = {}
     for name, verdict in report.candidates.items():
-        own: Sequence[Answer] = [c for c in report.criteria if c.candidate == name]
+        own: Sequence[Answer] = [c for c in counting(report) if c.candidate == name]
         unmet = next((c for c in own if c.verdict == verdict != "PASS"), None)
         found[name] = f"{unmet.id}: {against(unmet)}" if unmet else ""
     return found
@@ -142,6 +156,8 @@ def passed_by(report: GateReport) -> str:
     if report.verdict != "PASS":
         return ""
     text = "every required criterion holds"
+    if len(counting(report)) < len(report.criteria):
+        text += " but those that are overridden"
     names = sorted(name for name, verdict in report.candidates.items() if verdict == "PASS")
     if names:
         text += f"; {', '.join(names)} {'pass' if len(names) > 1 else 'passes'} whole"

@@ -12,6 +12,7 @@ from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.overrides import OVERRIDES
 from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
@@ -92,7 +93,7 @@ GATE = GateSpec(
     gate="D",
     settings=StressSettings,
     criteria=criteria_of(vars(trial), vars(cost), vars(safety), globals()),
-    bind=(JOURNALS, PREREGISTRATION),
+    bind=(JOURNALS, PREREGISTRATION, OVERRIDES),
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(

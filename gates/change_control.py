@@ -1,0 +1,201 @@
+"""Which limits moved after the evidence that they judge was there: by whom, when and which way.
+
+What git says, asked each time anew: in a report it would change the bytes with every commit, and
+a bundle has no history to derive it from. A move is one commit, so that a limit that went and came
+back shows twice. It came after the evidence unless it lies before every commit that brought the
+hash of that evidence into `dvc.lock`: the order of commits is known, the hour of a run is not.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gates.card.history import MEASURED, brought_by, commits_of, evidence_digests, unknown_history
+from gates.git import git
+from gates.overrides import placed, read_overrides
+from gates.pipeline import LOCK
+from gates.preregistration import Move, asked_by, moves, plan_of
+from gates.report import GATES, Gate
+from gates.settings import PARAMS_FILE, read_params
+from genpolicy.errors import GenpolicyError
+from genpolicy.integrity.documents import parse_yaml
+
+NOT_COMMITTED = "not committed"
+FIELDS = "%H%x00%P%x00%an <%ae>%x00%cs"
+"""Of a commit: its hash, its parents, who wrote it and the day on which it was committed."""
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """One limit, or another setting of the plan, that one commit moved.
+
+    Attributes:
+        gate: The lowest gate that judges by it.
+        place: In `params.yaml`, a limit by its gate and criterion.
+        kind: `loosened`, `tightened`, or `changed` where neither side is stricter.
+        before: What stood there.
+        now: What the commit put there.
+        commit: Its hash; empty for what is not committed.
+        day: Of the commit, YYYY-MM-DD; empty likewise.
+        by: Who wrote it; empty likewise.
+        after: Evidence stages that had written theirs.
+    """
+
+    gate: Gate
+    place: str
+    kind: str
+    before: str
+    now: str
+    commit: str
+    day: str
+    by: str
+    after: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Control:
+    """What git says of limits and of evidence.
+
+    Attributes:
+        unknown: Why it says nothing; empty where it does.
+        shifted: Limits that moved after their evidence was there, the newest first.
+        undated: Evidence stages whose evidence is in no commit, so that nobody knows what of the
+            committed limits is older.
+        overrides: Each written exception, and who committed it.
+    """
+
+    unknown: str
+    shifted: tuple[Shifted, ...]
+    undated: tuple[str, ...]
+    overrides: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Commit:
+    """A commit that changed `params.yaml`; that of the working tree has no hash."""
+
+    sha: str
+    parents: tuple[str, ...]
+    by: str
+    day: str
+
+
+def control_of(root: Path) -> Control:
+    """What moved after its evidence, by the history of the repository around `root`.
+
+    Raises:
+        ConfigError: `params.yaml`, `overrides.yaml` or the lock file is malformed.
+    """
+    params = read_params(root)
+    if unknown := _unknown(root):
+        said = tuple(f"{placed(entry)}, by {entry.by}" for entry in read_overrides(root, params))
+        return Control(unknown, (), (), said)
+    known = evidence_digests(root) if (root / LOCK).is_file() else {}
+    dated = {stage: commits_of(root, known[stage]) for stage in MEASURED if known.get(stage)}
+    older = {
+        stage: set.intersection(*(_ancestors(root, commit) for commit in commits))
+        for stage, commits in dated.items()
+        if commits
+    }
+    shifted: list[Shifted] = []
+    for commit in _commits(root):
+        there = [stage for stage in dated if commit.sha not in older.get(stage, {commit.sha})]
+        if not commit.sha:
+            there = list(dated)
+        if there:
+            shifted += _shifted(root, commit, params, there)
+    undated = tuple(stage for stage, commits in dated.items() if not commits)
+    return Control("", tuple(shifted), undated, tuple(_exceptions(root, params)))
+
+
+def control_text(control: Control) -> str:
+    """For a terminal: a line for each move, then what nobody knows and what is overridden."""
+    if control.unknown:
+        lines = [f"Who moved a limit is unknown: {control.unknown}."]
+    elif not control.shifted:
+        lines = ["No limit moved after its evidence was there."]
+    else:
+        lines = [f"{len(control.shifted)} moved after their evidence was there:"]
+    lines += [_line(shift) for shift in control.shifted]
+    lines += [
+        f"Unknown of {stage}: its evidence is in no commit, so that a limit may have been "
+        "committed behind it."
+        for stage in control.undated
+    ]
+    lines += [f"OVERRIDDEN  {text}" for text in control.overrides]
+    return "\n".join(lines)
+
+
+def _line(shift: Shifted) -> str:
+    who = f"{shift.by}, {shift.commit[:10]} of {shift.day}" if shift.commit else NOT_COMMITTED
+    return (
+        f"{shift.kind:<10} {shift.place}: {shift.before} -> {shift.now}, by {who}; "
+        f"after {', '.join(shift.after)}"
+    )
+
+
+def _unknown(root: Path) -> str:
+    """Why git says nothing of these limits; empty where it does."""
+    if found := unknown_history(root)[0]:
+        return f"the repository is {found}"
+    if not git(root, "log", "-1", "--format=%H", "--", PARAMS_FILE):
+        return f"{PARAMS_FILE} is in no commit"
+    return ""
+
+
+def _exceptions(root: Path, params: Mapping[str, Any]) -> Iterator[str]:
+    """Who committed each written exception, and when."""
+    for entry, commit in brought_by(root, read_overrides(root, params)):
+        who = git(root, "log", "-1", "--format=%an <%ae>, %h of %cs", commit) if commit else ""
+        yield (
+            f"{placed(entry)}: {entry.limit:.6g} by {entry.by} until {entry.expires}, committed "
+            f"by {who or f'nobody: {NOT_COMMITTED}'}"
+        )
+
+
+def _commits(root: Path) -> Iterator[_Commit]:
+    """What is not committed, then the commits that changed the limits, the newest first."""
+    head = git(root, "rev-parse", "HEAD") or ""
+    if git(root, "diff", "--quiet", "HEAD", "--", PARAMS_FILE) is None:
+        yield _Commit("", (head,), "", "")
+    listed = git(root, "log", "--full-history", f"--format={FIELDS}", "--", PARAMS_FILE) or ""
+    for line in listed.splitlines():
+        sha, parents, by, day = line.split("\0")
+        yield _Commit(sha, tuple(parents.split()), by, day)
+
+
+def _shifted(
+    root: Path, commit: _Commit, params: Mapping[str, Any], there: list[str]
+) -> Iterator[Shifted]:
+    """What a commit moved that the evidence is judged by: other than with each of its parents."""
+    now = _params_at(root, commit.sha) if commit.sha else params
+    each = [_moved(_params_at(root, parent), now) for parent in commit.parents]
+    for place, move in each[0].items() if each else ():
+        gate = asked_by(place)
+        reached = GATES[GATES.index(gate) :]
+        after = tuple(stage for stage in there if MEASURED[stage] in reached)
+        if after and all(place in other for other in each):
+            yield Shifted(
+                gate, place, move.kind, str(move.before), str(move.now),
+                commit.sha, commit.day, commit.by, after,
+            )  # fmt: skip
+
+
+def _moved(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Move]:
+    return {move.place: move for move in moves(plan_of(before), now)}
+
+
+def _params_at(root: Path, commit: str) -> Mapping[str, Any]:
+    """Settings as a commit left them; none where it had none that can be read."""
+    text = git(root, "show", f"{commit}:./{PARAMS_FILE}") or ""
+    try:
+        found = parse_yaml(text.encode(), where=PARAMS_FILE)
+    except GenpolicyError:
+        return {}
+    return found if isinstance(found, Mapping) else {}
+
+
+def _ancestors(root: Path, commit: str) -> set[str]:
+    """Commits that lie before one; itself is none of them."""
+    return {*(git(root, "rev-list", commit) or "").split()} - {commit}
