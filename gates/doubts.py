@@ -55,8 +55,8 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
     moved limits by the gate that names most of them, which hold for those below it too.
 
     Returns:
-        The first are few, and begin with what is overridden, rehearsal, moved limits, what was waived and clocks that
-        differ; the second are caveats.
+        The first are few, and begin with what is overridden, rehearsal, moved limits, what was
+        waived and clocks that differ; the second are caveats.
     """
     every = list(reports)
     weighed = [doubt for rule in RULES[:-1] for report in every for doubt in rule(report)]

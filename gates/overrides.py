@@ -229,7 +229,8 @@ def said(entry: Overridden) -> str:
     if entry.verdict == "PASS":
         return f"{text} It holds without."
     also = "" if entry.instead == "PASS" else f" Even so it is {entry.instead}."
-    return f"{text}{also} Without it: {entry.criterion} {entry.verdict}, gate {entry.without}."
+    without = f"{entry.criterion} {entry.verdict}, gate {entry.gate} {entry.without}"
+    return f"{text}{also} Without it: {without}."
 
 
 def aside(overrides: Sequence[Overridden]) -> str:

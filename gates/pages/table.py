@@ -116,8 +116,8 @@ def tally(report: GateReport) -> str:
         texts.append(f"{absent} not measured")
     if waiting := _count(report, "PENDING_REVIEW"):
         texts.append(f"{waiting} {'waits' if waiting == 1 else 'wait'} for a person")
-    if aside := sum(bool(overridden(c, report)) for c in report.criteria):
-        texts.append(f"{aside} overridden")
+    if excepted := sum(bool(overridden(c, report)) for c in report.criteria):
+        texts.append(f"{excepted} overridden")
     return "; ".join(texts)
 
 

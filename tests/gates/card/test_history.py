@@ -15,6 +15,7 @@ from gates.card.history import (
     require_history,
     require_makers_known,
     require_registered_first,
+    require_said_by_themselves,
 )
 from gates.card.people import AllowList, Person
 from gates.pipeline import RUNGS
@@ -24,7 +25,17 @@ from genpolicy.evidence.documents.brought import BROUGHT, Brought
 from genpolicy.integrity.documents import canonical_json
 
 PLAN, LOCK = "preregistration.yaml", "dvc.lock"
-FILES = {"plan": PLAN, "lock": LOCK, "params": "params.yaml", "code": "genpolicy/code.py"}
+EXCEPTION = {
+    "gate": "D", "criterion": "hold_share_upper", "candidate": "flow", "limit": 0.3,
+    "by": "rita", "reason": "r", "expires": "2026-12-24",
+}  # fmt: skip
+FILES = {
+    "overrides": "overrides.yaml",
+    "plan": PLAN,
+    "lock": LOCK,
+    "params": "params.yaml",
+    "code": "genpolicy/code.py",
+}
 
 
 @pytest.fixture
@@ -477,3 +488,66 @@ def test_who_made_a_policy_that_was_brought_is_an_author_of_the_card(history, pe
     BROUGHT.write(folder, {"flow": replace(entry, author="who@example.org")})
     with pytest.raises(IntegrityError, match="by somebody not on"):
         require_author_of_brought(root, "flow", ["ada"], people)
+
+
+def _exceptions(*entries):
+    return yaml.safe_dump({"overrides": list(entries)})
+
+
+RITA = AllowList(
+    people=tuple(
+        Person(
+            id=name,
+            name=name,
+            role="reviewer",
+            public_key="0" * 64,
+            emails=(f"{name}@example.org",),
+        )
+        for name in ("rita", "mo")
+    )
+)
+
+
+def test_an_exception_is_committed_by_whom_it_names(history):
+    root, commit = history
+    require_said_by_themselves(root, RITA)
+    commit("ada", overrides=_exceptions())
+    require_said_by_themselves(root, RITA)
+    commit("rita", overrides=_exceptions(EXCEPTION))
+    require_said_by_themselves(root, RITA)
+    other = {**EXCEPTION, "by": "mo", "candidate": "diffusion"}
+    commit("mo", overrides=_exceptions(other, EXCEPTION))
+    require_said_by_themselves(root, RITA)
+
+
+@pytest.mark.parametrize("author", ["ada", "mo"])
+@pytest.mark.parametrize("change", [{}, {"expires": "2027-12-24"}, {"limit": 0.4}])
+def test_nobody_overrides_or_renews_in_the_name_of_another(history, author, change):
+    root, commit = history
+    if change:
+        commit("rita", overrides=_exceptions(EXCEPTION))
+    commit(author, overrides=_exceptions({**EXCEPTION, **change}))
+    text = f"committed by {author}@example.org, expected a commit of rita"
+    with pytest.raises(IntegrityError, match=text):
+        require_said_by_themselves(root, RITA)
+
+
+def test_an_exception_that_was_taken_out_is_said_anew(history):
+    root, commit = history
+    commit("rita", overrides=_exceptions(EXCEPTION))
+    commit("rita", overrides=_exceptions())
+    commit("ada", overrides=_exceptions(EXCEPTION))
+    with pytest.raises(IntegrityError, match="committed by ada"):
+        require_said_by_themselves(root, RITA)
+
+
+def test_an_exception_that_is_not_committed_is_nobodys(history):
+    root, commit = history
+    commit("rita", overrides=_exceptions(EXCEPTION))
+    (root / "overrides.yaml").write_text(_exceptions({**EXCEPTION, "limit": 0.4}))
+    with pytest.raises(IntegrityError, match="not committed as it lies here"):
+        require_said_by_themselves(root, RITA)
+    (root / "overrides.yaml").write_text(_exceptions({**EXCEPTION, "by": "eve"}))
+    commit("eve")
+    with pytest.raises(IntegrityError, match="a commit of eve"):
+        require_said_by_themselves(root, RITA)
