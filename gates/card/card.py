@@ -19,6 +19,7 @@ from gates.card.windows import AbortWindow
 from gates.claim import CHECKPOINT_ONLY
 from gates.doubts import for_a_card
 from gates.floors import HARDEST_CONTACT_N
+from gates.overrides import OVERRIDDEN
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -183,13 +184,14 @@ def thresholds_of(report: GateReport) -> dict[str, float]:
 def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
     """What a signer signs in spite of, each once, after what was tested at all.
 
-    The caveats of the reports, then what could make them wrong: near a limit, judged at a point.
+    The caveats of the reports, limits that somebody overrides before all others, then what could make them wrong: near a limit, judged at a point.
 
     Raises:
         RefusedError: Gate D promotes no one.
     """
     candidate = promoted(reports["D"])
     found = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    found.sort(key=lambda caveat: not caveat.startswith(f"{OVERRIDDEN} "))
     doubts = [text for gate in sorted(reports) for text in for_a_card(reports[gate], candidate)]
     return tuple(dict.fromkeys([CHECKPOINT_ONLY, *found, *doubts]))
 

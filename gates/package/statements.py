@@ -8,7 +8,6 @@ derives it again, and people sign the trial card.
 
 from typing import Any
 
-from gates.overrides import said
 from gates.report import Gate, GateReport, report_path
 
 STATEMENT_TYPE = "https://in-toto.io/Statement/v1"
@@ -40,7 +39,6 @@ def statement_of(
         "predicate": {
             "gate": report.gate,
             "verdict": report.verdict,
-            "overrides": [said(entry) for entry in report.overrides],
             "of_candidate": report.candidates.get(candidate),
             "promoted": report.promoted == candidate,
             "upstream": report.upstream,

@@ -59,7 +59,7 @@ def proved(stand_in):
 
     def proved(states, *, page=None, history=None):
         put("gates.proof.prove_all", states)
-        put("gates.printed.page_problem", page)
+        put("gates.printed.problems_beside", [page] if page else [])
         put("gates.card.history.require_history", history)
         put("gates.printed.print_rungs")
         put("gates.printed.print_cases")
@@ -146,12 +146,14 @@ def beneath(stand_in):
 
 def test_nobody_signs_before_chain_history_and_journals_were_asked(stand_in, beneath, capsys):
     put, calls = stand_in
-    put("gates.proof.prove_chain")
+    put("gates.proof.prove_chain", ("reports", "hashes"))
+    put("gates.overriders.require_in_force")
     put("gates.card.signing.sign_card", Path("cards/x.json"))
     calls.clear()
     assert commands.sign_card(Path("c.json"), Path("k.pem"), "rita", ROOT) == 0
     signed = ("sign_card", ROOT, Path("c.json"), Path("k.pem"), "rita")
-    assert calls == [("prove_chain", ROOT, "D"), *beneath[0], signed]
+    before = [("prove_chain", ROOT, "D"), ("require_in_force", ROOT, "reports")]
+    assert calls == [*before, *beneath[0], signed]
     said = "Signed x.json as rita. Judge gate E again to see what is missing.\n"
     assert capsys.readouterr().out == said
 
@@ -206,7 +208,7 @@ def test_a_plan_is_the_bytes_of_the_settings(stand_in, tmp_path, capsys):
 def test_a_judged_gate_says_what_decided_or_what_follows(stand_in, capsys, decided, said):
     put, calls = stand_in
     put("gates.writing.write_gate", REPORT)
-    put("gates.proof.decided_text", decided)
+    put("gates.verdicts.decided_text", decided)
     assert commands.judge("a", ROOT) == 0
     assert calls[0] == ("write_gate", ROOT, "A")
     assert capsys.readouterr().out == f"Gate A: PASS. {said}\n"

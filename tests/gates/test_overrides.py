@@ -29,7 +29,7 @@ from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
 from gates.proof import SPECS, judge, verify_report
 from gates.report import Answer, read_report, report_bytes, report_path
-from gates.settings import Limit, Limits, read_limits
+from gates.settings import Limit, Limits, read_limits, read_params
 from gates.verdicts import counting, decided_by
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.atomic import write_bytes
@@ -277,7 +277,9 @@ def test_a_gate_that_passes_by_an_exception_says_so_wherever_it_is_read(ladder):
     assert "overridden: PASS by ≤ 6 %, by rita until 2026-12-24" in gate_page(ladder, report)
     text = moved_text(moved({"D": before}, {"D": report}))
     assert f"OVERRIDDEN + {sentence}" in text
-    assert exceptions_of(ladder, {}, "E").below == report.overrides, "the card repeats it"
+    assert exceptions_of(ladder, read_params(ladder), "E").below == report.overrides, (
+        "the card repeats it"
+    )
     hashes = {gate: read_report(ladder, gate)[1] for gate in "ABC"}
     assert verify_report(ladder, "D", upstream=hashes)[0] == report, "on any day, by anybody"
 

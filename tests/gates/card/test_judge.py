@@ -6,13 +6,18 @@ import json
 
 import evidence
 import pytest
+import yaml
 from team import AUTHORS, PEOPLE
 
+from gates import proof
+from gates.card.card import card_bytes
+from gates.card.drafting import draft
 from gates.card.judge import CardGateSettings
 from gates.card.papers import examine
 from gates.claim import CHECKPOINT_ONLY
-from gates.report import parse_section
+from gates.report import parse_section, read_report, report_bytes, report_path
 from genpolicy.errors import ConfigError
+from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_file
 
@@ -419,3 +424,37 @@ def test_a_card_does_not_outlive_the_exception_by_which_its_candidate_stands(
     others = {"gate_b": {"unmatched": {"another": exception}}}
     evidence.write_params(signed.root, lambda params: params["gate_b"].update(others["gate_b"]))
     assert {c.id: c for c in signed.judge().criteria}["not_expired"].verdict == "PASS"
+
+
+def test_a_limit_that_is_overridden_stands_on_the_card_and_ends_it(team, monkeypatch):
+    """The day before its end, the day itself, the day after; and no card outlives it."""
+    root, last = team.root, datetime.date(2026, 11, 25)
+    entry = {
+        "gate": "D", "criterion": "hold_share_upper", "candidate": "flow", "limit": 0.06,
+        "by": "rita", "reason": "the cell waits", "expires": str(last),
+    }  # fmt: skip
+    evidence.write_params(root, evidence.set_limit("gate_d", "hold_share_upper", 0.04))
+    (root / "overrides.yaml").write_text(yaml.safe_dump({"overrides": [entry]}))
+    write_bytes(root / report_path("D"), report_bytes(proof.judge(root, "D")))
+    found = {gate: read_report(root, gate) for gate in "ABCD"}
+    reports = {gate: report for gate, (report, _) in found.items()}
+    hashes = {gate: digest for gate, (_, digest) in found.items()}
+    monkeypatch.setattr(proof, "prove_chain", lambda root, through: (reports, hashes))
+    card = draft(root, reports, hashes)
+    write_bytes(root / "artifacts/card/card.json", card_bytes(card))
+    evidence.record(root)
+    assert card.caveats[1].startswith("OVERRIDDEN at gate D: hold_share_upper of flow")
+    team.sign(team.complete(), PEOPLE)
+    report = team.judge(today=last)
+    assert _red(report) == {"not_expired"}, "valid to the 30th"
+    team.sign(team.complete(expires=str(last)), PEOPLE)
+    for day in (last - datetime.timedelta(1), last):
+        report = team.judge(today=day)
+        assert report.verdict == "PASS" and report.overrides == reports["D"].overrides
+        assert "OVERRIDDEN: hold_share_upper by rita; without, gate D FAIL." in report.decision
+        assert report.caveats[0] == card.caveats[1]
+    report = team.judge(today=last + datetime.timedelta(1))
+    assert _red(report) == {"upstream_passed", "not_expired"}
+    assert "over since 2026-11-25" in report.criteria[0].caveat
+    team.allow({**{n: r for n, r in PEOPLE.items() if n != "rita"}, **AUTHORS, "rita": "author"})
+    assert "rita, an author" in team.judge(today=last).criteria[0].caveat

@@ -37,6 +37,7 @@ def index():
         groups=[BundledGroup(number=1, title="t", files=["c"])],
         files=files,
         statements={"A": sha256_bytes(STATEMENT)},
+        limits=[],
     )
 
 

@@ -22,6 +22,7 @@ def index_of(*names, **changes):
         "groups": [BundledGroup(number=1, title="t", files=list(files)[:1])],
         "files": files,
         "statements": {"A": SHA},
+        "limits": [],
     }
     return BundleIndex(**{**values, **changes})
 
