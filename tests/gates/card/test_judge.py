@@ -447,6 +447,7 @@ def test_a_limit_that_is_overridden_stands_on_the_card_and_ends_it(team, monkeyp
     team.sign(team.complete(), PEOPLE)
     report = team.judge(today=last)
     assert _red(report) == {"not_expired"}, "valid to the 30th"
+    team.envelope.unlink()
     team.sign(team.complete(expires=str(last)), PEOPLE)
     for day in (last - datetime.timedelta(1), last):
         report = team.judge(today=day)
