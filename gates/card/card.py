@@ -184,7 +184,8 @@ def thresholds_of(report: GateReport) -> dict[str, float]:
 def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
     """What a signer signs in spite of, each once, after what was tested at all.
 
-    The caveats of the reports, limits that somebody overrides before all others, then what could make them wrong: near a limit, judged at a point.
+    The caveats of the reports, limits that somebody overrides before all others, then what could
+    make them wrong: near a limit, judged at a point.
 
     Raises:
         RefusedError: Gate D promotes no one.

@@ -123,6 +123,14 @@ def test_a_file_of_another_form_is_refused(tmp_path, text):
         read_overrides(tmp_path, evidence.PARAMS)
 
 
+def test_a_rehearsal_with_looser_limits_takes_the_exceptions_of_its_checkout(tmp_path):
+    params = copy.deepcopy({**evidence.PARAMS, "rehearsal": True})
+    evidence.set_limit("gate_d", "hold_share_upper", 0.4)(params)
+    assert len(_read(tmp_path, ENTRY, params=params)) == 1
+    with pytest.raises(ConfigError, match="above the limit"):
+        _read(tmp_path, ENTRY, params={**params, "rehearsal": False})
+
+
 def test_a_limit_is_overridden_once(tmp_path):
     with pytest.raises(ConfigError, match="overridden twice"):
         _read(tmp_path, ENTRY, {**ENTRY, "by": "mo"})

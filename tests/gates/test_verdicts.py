@@ -2,13 +2,25 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gates.report import Answer
-from gates.verdicts import SEVERITY, best, combine, first_unmet, judge_criterion, rounded, worst
+from gates.report import Answer, Overridden
+from gates.verdicts import (
+    SEVERITY,
+    best,
+    combine,
+    counting,
+    decided_by,
+    decided_text,
+    first_unmet,
+    judge_criterion,
+    rounded,
+    worst,
+)
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 VERDICTS = st.sampled_from(sorted(SEVERITY))
@@ -137,3 +149,25 @@ def test_the_first_unmet_criterion_is_named_required_before_candidates():
     assert first_unmet(rows, "PASS") is None
     assert first_unmet(rows[:1], "FAIL").id == "own"
     assert first_unmet([criterion("PASS"), *rows], "INCONCLUSIVE") is None
+
+
+@pytest.mark.parametrize(
+    ("gate", "instead", "spared"),
+    [("A", "PASS", True), ("A", "FAIL", False), ("A", None, False), ("B", "PASS", False)],
+)
+def test_what_is_overridden_decides_nothing_if_it_holds_so_and_is_of_this_gate(
+    gate, instead, spared
+):
+    rows = [criterion("FAIL", None, "first"), criterion("FAIL", None, "second")]
+    entry = Overridden(
+        gate=gate, criterion="first", candidate=None, comparison="<=", threshold=1.0, limit=2.0,
+        by="rita", reason="r", expires="2026-12-24", verdict="FAIL", instead=instead,
+        without="FAIL",
+    )  # fmt: skip
+    changes = {"gate": "A", "verdict": "FAIL", "criteria": tuple(rows), "overrides": (entry,)}
+    report = SimpleNamespace(**changes)
+    assert counting(report) == (rows[1:] if spared else rows)
+    assert decided_by(report).id == ("second" if spared else "first")
+    assert decided_text(report).startswith("second" if spared else "first")
+    report.verdict = "PASS"
+    assert decided_by(report) is None
