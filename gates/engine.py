@@ -168,8 +168,7 @@ def judge(
     Args:
         spec: The gate.
         evidence: What it may read.
-        limits: By criterion; a criterion without one is INCONCLUSIVE, one that is declared not
-            applicable is a caveat and is not asked.
+        limits: By criterion; one without is INCONCLUSIVE, one not applicable a caveat, not asked.
         settings: Recorded in the report.
         given: What the measures take in place of the settings, where a gate knows more.
         candidates: Methods that stand for promotion.
@@ -177,14 +176,11 @@ def judge(
         exceptions: Limits that somebody overrides, here and below.
 
     Raises:
-        IntegrityError: Evidence that is not what it claims to be.
-        ConfigError: An exception that does not fit its criterion.
+        BadInputError: Evidence that is not what it claims, or an exception that does not fit.
     """
     inputs = settings.under(limits) if given is None else given
     answers = []
-    for item in spec.criteria:
-        if item.id in limits.waived:
-            continue
+    for item in (one for one in spec.criteria if one.id not in limits.waived):
         limit = limits.of.get(item.id)
         names = candidates if item.per_candidate else (None,)
         asked = (name for name in names if not settings.excepted(item.id, name))
@@ -196,8 +192,7 @@ def judge(
     judged = Judged(evidence, inputs, ruled.answers, verdict, ruled.candidates)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
-    shown = spec.said(judged) if spec.said else ()
-    beside = (*_waivers(limits), *settings.caveats, *shown)
+    beside = (*_waivers(limits), *settings.caveats, *(spec.said(judged) if spec.said else ()))
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,
