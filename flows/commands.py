@@ -39,11 +39,24 @@ def ladder(workspace: Workspace = Path()) -> int:
     """Run the ladder as Prefect flows.
 
     Without PREFECT_API_URL a temporary server is started. Exit codes: 0 done,
-    1 a fault, 2 bad input, 3 refused by a gate that does not pass.
+    1 a fault, 2 bad input, 3 refused by a gate that does not pass. Gate E is
+    suspended until the signed card is there; `genpolicy resume` goes on.
     """
     from flows.ladder import run_ladder
 
     return run_ladder(workspace)
+
+
+@with_examples("genpolicy resume")
+def resume(workspace: Workspace = Path()) -> int:
+    """Go on with gate E, suspended by `genpolicy ladder`.
+
+    The signed card is verified first: a wrong one is told with its reason, and
+    leaves the run suspended (exit 3). The run then judges it again by itself.
+    """
+    from flows.resume import resume_gate
+
+    return resume_gate(workspace)
 
 
 @with_examples("genpolicy serve --cron '0 3 * * *'")

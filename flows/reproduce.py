@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flows.estimate import estimate
 from flows.judged import GOES_ON, judged, last_gate
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError, GenpolicyError
@@ -184,6 +185,8 @@ def reproduce_here(
             expected="a workspace of the ladder",
             action="Name one with --workspace.",
         )
+    if not stages:
+        print(estimate(workspace), flush=True)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         outcome = reproduce(

@@ -1,10 +1,22 @@
-"""Serve the ladder as a Prefect deployment: start it from the interface, or by a schedule."""
+"""Serve the ladder as a Prefect deployment: start it from the interface, or by a schedule.
+
+Gate E is served beside it under the same name, so that a run of it goes on when it is resumed.
+"""
 
 import sys
 from pathlib import Path
+from typing import cast
 
-from flows.ladder import FIRST_ANSWER_S, ladder, server_answers, server_url
+from flows import prefect_settings  # noqa: F401
+
+# isort: split
+from prefect import serve
+from prefect.deployments.runner import RunnerDeployment
+
+from flows.card_gate import gate_e
+from flows.ladder import ladder
 from flows.reproduce import EXIT_FAULT
+from flows.server import FIRST_ANSWER_S, server_answers, server_url
 from genpolicy.cli.shell import run_program
 
 
@@ -19,13 +31,12 @@ def serve_ladder(name: str, *, workspace: Path, cron: str | None) -> int:
             file=sys.stderr,
         )
         return EXIT_FAULT
-    ladder.serve(
-        name=name,
-        parameters={"workspace": str(workspace.resolve())},
-        cron=cron,
-        limit=1,
-        print_starting_message=True,
+    folder = str(workspace.resolve())
+    both = (
+        ladder.to_deployment(name, parameters={"workspace": folder}, cron=cron),
+        gate_e.to_deployment(name),
     )
+    serve(*cast("tuple[RunnerDeployment, RunnerDeployment]", both), limit=1)
     return 0
 
 

@@ -31,6 +31,7 @@ from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
+from genpolicy.progress import ProgressLine
 from genpolicy.tasks.api import Task
 from genpolicy.verification.clocks import derived_windows
 from genpolicy.wall_clock.admission import judge
@@ -72,13 +73,17 @@ def write_clocks(
     journals = folder / "journals"
     journals.mkdir()
     paths: list[Path] = []
-    for candidate in candidates:
+    said, clocks = ProgressLine("runs of a clock"), 2 * len(candidates)
+    for place, candidate in enumerate(candidates):
+        said(2 * place, clocks)  # between two runs, while nothing is timed
         # A server that is not there costs its candidate the comparison, and Gate D says so.
         try:
-            paths += run_both(shared, candidate, models[candidate.name], journals=journals)
+            model, halfway = models[candidate.name], partial(said, 2 * place + 1, clocks)
+            paths += run_both(shared, candidate, model, journals=journals, between=halfway)
         except PolicyError:
             for left in journals.glob(f"{candidate.name}__*"):
                 left.unlink()
+    said.close()
     cell = read_limits(shared.root).cell
     found = derived_windows(paths, deadline_s=cell.execution.deadline_s)
     for row, columns in (
@@ -91,7 +96,12 @@ def write_clocks(
 
 
 def run_both(
-    shared: Bench, candidate: Contender, model: LatencyModel, *, journals: Path
+    shared: Bench,
+    candidate: Contender,
+    model: LatencyModel,
+    *,
+    journals: Path,
+    between: Callable[[], None],
 ) -> tuple[Path, Path]:
     """Replay every window by the wall clock, then by the virtual one.
 
@@ -100,6 +110,7 @@ def run_both(
         candidate: Who answers.
         model: Its latency, as Gate B measured it.
         journals: Existing folder.
+        between: Called behind the first clock.
 
     Returns:
         Paths of the two journals.
@@ -124,6 +135,7 @@ def run_both(
         )  # fmt: skip
         running.wait()
         shutil.move(by_the_wall / JOURNAL, paths[0])
+        between()
         with asked.here() as policy:
             virtually(shared, policy, asked.candidates, request, model, folder=Path(scratch))
         shutil.move(Path(scratch) / JOURNAL, paths[1])

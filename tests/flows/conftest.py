@@ -5,9 +5,15 @@ import socket
 import struct
 import subprocess
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from flows import prefect_settings  # noqa: F401
+
+# isort: split
+from prefect.testing.utilities import prefect_test_harness
 
 # Prefect talks to its own server over the loopback interface; without any network it is down.
 SIOCGIFFLAGS, SIOCSIFFLAGS, IFF_UP = 0x8913, 0x8914, 0x1
@@ -32,8 +38,23 @@ if name.startswith("gate_"):
     report = pathlib.Path("reports") / f"{name}.md"
     report.parent.mkdir(exist_ok=True)
     report.write_text(f"# {name}\\n\\nPASS\\n")
+    card = pathlib.Path("cards/card.txt")
     said = {"verdict": params[name].get("verdict", "PASS"), "decision": "Return to the dataset."}
+    if name == "gate_e":
+        said["verdict"] = card.read_text() if card.exists() else "PENDING_REVIEW"
     report.with_suffix(".json").write_text(json.dumps(said))
+"""
+
+# What a flow asks before it lets gate E pass: `python -m genpolicy card verify`, of the workspace.
+PROGRAM = """
+import pathlib, sys, yaml
+assert sys.argv[1:] == ["card", "verify"], sys.argv
+card = pathlib.Path("cards/card.txt")
+verdict = card.read_text() if card.exists() else "PENDING_REVIEW"
+verdict = yaml.safe_load(pathlib.Path("params.yaml").read_text())["gate_e"]["asked"] or verdict
+print(f"{verdict}: so it is said.")
+print(f"  {verdict:<14} signature_valid: the card is refused: signed by the unknown key abc")
+sys.exit(0 if verdict == "PASS" else 3)
 """
 
 NAMES = ("record", "gate_a", "generators", "gate_b")
@@ -42,18 +63,45 @@ NAMES = ("record", "gate_a", "generators", "gate_b")
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """A git checkout of the toy ladder."""
-    folder = tmp_path / "checkout"
+    return _made(tmp_path / "checkout", NAMES)
+
+
+@pytest.fixture
+def waiting_checkout(tmp_path: Path) -> Path:
+    """Another, which ends with a gate E that waits for `cards/card.txt`, a verdict."""
+    folder = _made(tmp_path / "waiting", ("gate_a", "gate_e"))
+    (folder / "genpolicy").mkdir()
+    (folder / "genpolicy" / "__init__.py").touch()
+    (folder / "genpolicy" / "__main__.py").write_text(textwrap.dedent(PROGRAM))
+    params = folder / "params.yaml"
+    params.write_text(params.read_text() + "  asked: ''\n")
+    pipeline = folder / "dvc.yaml"
+    text = pipeline.read_text()
+    pipeline.write_text(text.replace("stage.py, artifacts/gate_a]", "stage.py, cards]"))
+    (folder / "cards").mkdir()
+    (folder / "cards" / "README.md").write_text("Signed cards lie here.\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def server(loopback: None) -> Iterator[None]:
+    """A Prefect server of its own, with an empty database, for a file of tests."""
+    with prefect_test_harness(server_startup_timeout=120):
+        yield
+
+
+def _made(folder: Path, names: tuple[str, ...]) -> Path:
     (folder / ".dvc").mkdir(parents=True)
     (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n")
     (folder / ".gitignore").write_text("/artifacts/\n/build/\n")
     (folder / "stage.py").write_text(textwrap.dedent(STAGE))
     (folder / "params.yaml").write_text(
-        "".join(f"{name}:\n  value: 1\n  code: 0\n  verdict: PASS\n" for name in NAMES)
+        "".join(f"{name}:\n  value: 1\n  code: 0\n  verdict: PASS\n" for name in names)
     )
     lines = ["stages:"]
-    for place, name in enumerate(NAMES):
+    for place, name in enumerate(names):
         lines += [f"  {name}:", f"    cmd: python stage.py {name}", "    deps: [stage.py"]
-        lines[-1] += f", artifacts/{NAMES[place - 1]}]" if place else "]"
+        lines[-1] += f", artifacts/{names[place - 1]}]" if place else "]"
         lines += [f"    params: [{name}]", f"    outs: [artifacts/{name}]"]
         if name.startswith("gate_"):
             lines += [f"    metrics: [reports/{name}.md: {{cache: false}}]"]

@@ -1,16 +1,13 @@
 import os
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
 
 import pytest
 
 from flows import ladder
-from flows.judged import judged
 from flows.workspace import make_workspace
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import ConfigError
 
 
 def test_stages_are_cut_behind_every_gate() -> None:
@@ -19,59 +16,6 @@ def test_stages_are_cut_behind_every_gate() -> None:
     assert plan == {"a": ("record", "audit", "gate_a"), "b": ("shadow", "gate_b")}
     with pytest.raises(ConfigError, match="stress behind the last gate"):
         ladder.stages_by_gate({"stages": dict.fromkeys((*names, "stress"))})
-
-
-class _State:
-    def __init__(self, error: Exception) -> None:
-        self.error = error
-
-    def result(self, raise_on_failure: bool) -> Exception:
-        assert not raise_on_failure
-        return self.error
-
-
-@pytest.mark.parametrize(
-    ("error", "expected"),
-    [
-        (ladder.StageStoppedError(3, "refused", False), False),
-        (ladder.StageStoppedError(2, "bad input", False), False),
-        (ladder.StageStoppedError(1, "our fault", False), False),
-        (ladder.StageStoppedError(1, "killed", True), True),
-        (ValueError("something else"), False),
-    ],
-)
-def test_only_faults_of_the_machine_are_tried_again(error: Exception, expected: bool) -> None:
-    assert ladder.worth_a_retry(None, None, _State(error)) is expected
-
-
-def test_a_silent_server_is_given_up_once_and_a_slow_one_is_not() -> None:
-    given_up = threading.Event()
-    started = time.monotonic()
-    calls: list[str] = []
-
-    def give_up(url: str) -> None:
-        calls.append(url)
-        given_up.set()
-
-    with ladder.watch_server(
-        "u", silence_s=0.3, period_s=0.02, answers=lambda _: False, give_up=give_up
-    ):
-        assert given_up.wait(10)
-        assert time.monotonic() - started >= 0.3
-        time.sleep(0.1)
-    assert calls == ["u"]
-
-    answers = iter([False, False, True] * 1000)
-    calls.clear()
-    with ladder.watch_server(
-        "u", silence_s=0.5, period_s=0.02, answers=lambda _: next(answers), give_up=calls.append
-    ):
-        time.sleep(1.0)
-    assert calls == []
-
-
-def test_the_limits_on_silence_leave_a_minute_untouched() -> None:
-    assert ladder.SILENCE_S + ladder.PROBE_PERIOD_S + ladder.FIRST_ANSWER_S < 60
 
 
 def test_an_unreachable_server_ends_the_flow_and_runs_nothing(
@@ -120,12 +64,24 @@ def test_a_gate_that_waits_for_people_is_complete_under_that_name(
     assert "PENDING_REVIEW(" in done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("text", ["{}", "[]", '{"verdict": 1}'])
-def test_a_gate_without_a_verdict_is_bad_input(tmp_path: Path, text: str) -> None:
-    (tmp_path / "reports").mkdir()
-    (tmp_path / "reports" / "gate_a.json").write_text(text)
-    with pytest.raises(BadInputError, match="without a verdict"):
-        judged(tmp_path, "gate_a")
+def test_a_gate_e_that_waits_is_suspended_behind_a_ladder_that_is_done(
+    waiting_checkout: Path, tmp_path: Path
+) -> None:
+    target = make_workspace(waiting_checkout, tmp_path / "run", {})
+    done = _run(target, tmp_path)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, done.stderr
+    assert "Finished in state Suspended(" in said and "genpolicy resume" in done.stdout
+    assert (target / "build" / "runs.txt").read_text().split() == ["gate_a", "gate_e"]
+
+
+def test_a_gate_e_below_which_a_gate_does_not_pass_is_not_begun(
+    waiting_checkout: Path, tmp_path: Path
+) -> None:
+    target = make_workspace(waiting_checkout, tmp_path / "run", {"gate_a": {"verdict": "FAIL"}})
+    done = _run(target, tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert "gate-e" not in done.stdout + done.stderr
 
 
 def _run(workspace: Path, home: Path, **variables: str) -> "subprocess.CompletedProcess[str]":

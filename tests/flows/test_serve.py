@@ -1,7 +1,5 @@
 """Serving the ladder: without a server it says what to do, with one it serves one run at a time."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from flows import serve
@@ -11,7 +9,7 @@ from flows.reproduce import EXIT_FAULT
 @pytest.fixture
 def served(monkeypatch):
     calls = []
-    monkeypatch.setattr(serve, "ladder", SimpleNamespace(serve=lambda **how: calls.append(how)))
+    monkeypatch.setattr(serve, "serve", lambda *which, limit: calls.append((which, limit)))
     return calls
 
 
@@ -34,6 +32,12 @@ def test_one_run_at_a_time_in_a_workspace_that_does_not_depend_on_where_it_was_s
     monkeypatch.chdir(tmp_path)
     inside = type(tmp_path)("inside")
     assert serve.serve_ladder("nightly", workspace=inside, cron="0 3 * * *") == 0
-    (how,) = served
-    assert how["parameters"] == {"workspace": str(tmp_path / "inside")}
-    assert (how["name"], how["cron"], how["limit"]) == ("nightly", "0 3 * * *", 1)
+    (((ladder, gate_e), limit),) = served
+    assert ladder.parameters == {"workspace": str(tmp_path / "inside")}
+    assert (ladder.name, ladder.schedules[0].schedule.cron, limit) == ("nightly", "0 3 * * *", 1)
+    assert (gate_e.flow_name, gate_e.name, gate_e.schedules) == ("gate-e", "nightly", [])
+    assert ladder.flow_name == "ladder"
+    assert [one.entrypoint.rpartition("/")[2] for one in (ladder, gate_e)] == [
+        "ladder.py:ladder",
+        "card_gate.py:gate_e",
+    ], "whoever runs it loads it from there"

@@ -8,6 +8,7 @@ held against a process that it was not made from.
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,7 @@ from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow,
 from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel, draw_latency
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations
+from genpolicy.progress import counting
 from genpolicy.tasks.api import load_task
 
 RUNS = (1, 2)
@@ -92,15 +94,16 @@ class Taken:
 def measure_all(plan: LatencyPlan, policies: Sequence[Contender]) -> Taken:
     """Terms measured on this machine: two runs of several processes per method, in turns.
 
-    Methods and runs take turns, so that a machine which grows slower slows all of them.
+    Methods and runs take turns, so that a machine which grows slower slows all of them. How far it
+    is, is said between two processes, while nothing is timed.
     """
     taken = Taken([], [])
-    for process in PROCESSES:
-        for run in RUNS:
-            for judged in policies:
-                items, beside = in_fresh_process(measure_process, plan, judged)
-                taken.rows.extend(_measured_row(judged.name, run, process, item) for item in items)
-                taken.machine.append(MachineRow(judged.name, run, process, **vars(beside)))
+    turns = [(*turn, judged) for turn in product(PROCESSES, RUNS) for judged in policies]
+    for turn in counting(len(turns), "timed processes"):
+        process, run, judged = turns[turn]
+        items, beside = in_fresh_process(measure_process, plan, judged)
+        taken.rows.extend(_measured_row(judged.name, run, process, item) for item in items)
+        taken.machine.append(MachineRow(judged.name, run, process, **vars(beside)))
     return taken
 
 

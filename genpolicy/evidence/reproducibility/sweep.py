@@ -31,6 +31,7 @@ from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.windows import Windows
+from genpolicy.progress import counting
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import load_task
 
@@ -173,8 +174,10 @@ def sweep_latency_rows(
     """
     return [
         row
-        for judged in policies
-        for row in in_fresh_process(measure_sweep, plan, judged, sweep.get(judged.name, ()))
+        for turn in counting(len(policies), "timed sweeps")
+        for row in in_fresh_process(
+            measure_sweep, plan, policies[turn], sweep.get(policies[turn].name, ())
+        )
     ]
 
 
