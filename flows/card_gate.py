@@ -20,6 +20,7 @@ from flows import prefect_settings  # noqa: F401
 
 # isort: split
 from prefect import State, flow, get_client, get_run_logger, task
+from prefect.cache_policies import NO_CACHE
 from prefect.client.orchestration import SyncPrefectClient
 from prefect.client.schemas.filters import (
     FlowFilter,
@@ -38,6 +39,7 @@ from prefect.states import Cancelled, Completed, Failed, Pending
 from flows.gate_runs import STATE_NAMES, exit_code, run_gate
 from flows.judged import PENDING
 from flows.reproduce import EXIT_DONE, EXIT_FAULT, EXIT_REFUSED, stage_environment
+from flows.server import api_url, watch_server
 
 WAITS = "e"
 FLOW = "gate-e"
@@ -49,7 +51,7 @@ HOW_TO_GO_ON = (
 )
 
 
-@task(task_run_name="card verify")
+@task(task_run_name="card verify", cache_policy=NO_CACHE)
 def verify(workspace: str) -> str:
     """What is wrong with the signed card; empty where nothing is."""
     code, lines = ask_card(Path(workspace))
@@ -66,15 +68,16 @@ def gate_e(workspace: str, stages: list[str]) -> State[Any]:
         workspace: Folder with `dvc.yaml`, as the process that runs the flow sees it.
         stages: Stages of the gate in order; the last one judges.
     """
-    state = run_gate(Path(workspace), WAITS, stages)
-    if not state.is_completed():
-        return state
-    if state.name == PENDING:
-        # A key of its own each time: Prefect lets a run go on, unsigned, at a key it knows.
-        suspend_flow_run(key=str(uuid4()))
-        return Failed(name=STATE_NAMES[EXIT_FAULT], message="Prefect did not suspend the run.")
-    if wrong := verify(workspace):
-        return Failed(name=STATE_NAMES[EXIT_REFUSED], message=wrong)
+    with watch_server(api_url()):
+        state = run_gate(Path(workspace), WAITS, stages)
+        if not state.is_completed():
+            return state
+        if state.name == PENDING:
+            # A key of its own each time: Prefect lets a run go on, unsigned, at a key it knows.
+            suspend_flow_run(key=str(uuid4()))
+            return Failed(name=STATE_NAMES[EXIT_FAULT], message="Prefect did not suspend the run.")
+        if wrong := verify(workspace):
+            return Failed(name=STATE_NAMES[EXIT_REFUSED], message=wrong)
     return Completed(message=state.message)
 
 

@@ -14,6 +14,7 @@ from flows import prefect_settings  # noqa: F401
 # isort: split
 from prefect import State, get_run_logger, task
 from prefect.artifacts import create_link_artifact, create_markdown_artifact
+from prefect.cache_policies import NO_CACHE
 from prefect.states import Completed, Failed
 
 from flows.judged import GOES_ON, PENDING, judged
@@ -61,6 +62,7 @@ def worth_a_retry(_task: Any, _run: Any, state: State[Any]) -> bool:
 
 @task(
     task_run_name="{stage}",
+    cache_policy=NO_CACHE,  # DVC knows what is up to date; a run that is resumed judges again
     retries=RETRIES,
     retry_delay_seconds=list(RETRY_DELAY_S),
     retry_condition_fn=worth_a_retry,

@@ -10,6 +10,7 @@ from flows import card_gate
 from prefect import get_client
 from prefect.client.schemas.objects import StateType
 from prefect.flow_runs import resume_flow_run
+from prefect.settings import PREFECT_RESULTS_PERSIST_BY_DEFAULT, temporary_settings
 from prefect.states import Completed, Failed
 
 from flows.workspace import make_workspace
@@ -44,6 +45,14 @@ def resumed_by_anybody(workspace: Path):
         return card_gate.go_on(client.read_flow_run(run.id))
 
 
+@pytest.fixture
+def remembering():
+    """Prefect told to keep results: a run that is resumed would be given those of before."""
+    with temporary_settings({PREFECT_RESULTS_PERSIST_BY_DEFAULT: True}):
+        yield
+
+
+@pytest.mark.usefixtures("remembering")
 def test_it_is_suspended_again_and_again_until_the_card_is_there_and_then_passes(workspace):
     state = begin(workspace)
     assert (state.type, state.name) == (StateType.PAUSED, "Suspended")

@@ -65,16 +65,12 @@ def test_every_message_stands_where_and_when_the_journal_says_in_finite_numbers(
     events = [one.event for one in read_session(journal, SESSION).events]
     last_s = max(event.t for event in events) / NS_PER_S
     assert all(0 <= time_s <= last_s for time_s, *_ in messages)
-    ages = [
-        (time_s, shape["scalars"])
-        for time_s, place, _, shape in messages
-        if place == "/journal/accept/age"
-    ]
-    assert ages == [
-        (max(event.t, 0) / NS_PER_S, event.payload["age_ns"] / NS_PER_S)
-        for event in events
-        if event.kind == "accept"
-    ]
+    accepted = [event for event in events if event.kind == "accept"]
+    ages = [(at, shape) for at, place, _, shape in messages if place == "/journal/accept/age"]
+    assert [at for at, _ in ages] == [max(event.t, 0) / NS_PER_S for event in accepted]
+    assert [shape["scalars"] * NS_PER_S for _, shape in ages] == pytest.approx(
+        [event.payload["age_ns"] for event in accepted]
+    )
     for _, place, kind, shape in messages:
         assert place.startswith(("/replay/", "/journal/")), place
         for field in ("half_sizes", "centers", "strips", "positions", "translation"):
