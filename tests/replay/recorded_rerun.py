@@ -11,29 +11,42 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 RECORDED: dict[str, str] = {
-    "RecordingStream": "application_id, *, recording_id, make_default, make_thread_default, "
-    "default_enabled, send_properties, batcher_config",
+    "RecordingStream": (
+        "application_id, *, recording_id=, make_default=, make_thread_default=, "
+        "default_enabled=, send_properties=, batcher_config="
+    ),
     "RecordingStream.set_log_time_enabled": "enabled",
     "RecordingStream.set_log_tick_enabled": "enabled",
     "RecordingStream.memory_recording": "",
-    "RecordingStream.set_time": "timeline, *, sequence, duration, timestamp",
-    "RecordingStream.log": "entity_path, entity, *extra, static, strict",
+    "RecordingStream.set_time": "timeline, *, sequence=, duration=, timestamp=",
+    "RecordingStream.log": "entity_path, entity, *extra, static=, strict=",
     "Clear": "*, recursive",
-    "Transform3D": "*, translation, rotation, rotation_axis_angle, quaternion, scale, mat3x3, "
-    "from_parent, relation, child_frame, parent_frame",
+    "Transform3D": (
+        "*, translation=, rotation=, rotation_axis_angle=, quaternion=, scale=, mat3x3=, "
+        "from_parent=, relation=, child_frame=, parent_frame="
+    ),
     "Quaternion": "*, xyzw",
     "Scalars": "scalars",
-    "TextLog": "text, *, level, color",
-    "LineStrips3D": "strips, *, radii, colors, labels, show_labels, class_ids",
-    "Points3D": "positions, *, radii, colors, labels, show_labels, point_shading, class_ids, "
-    "keypoint_ids",
-    "Boxes3D": "*, sizes, mins, half_sizes, centers, rotation_axis_angles, quaternions, rotations, "
-    "colors, radii, fill_mode, labels, show_labels, class_ids",
-    "Ellipsoids3D": "*, half_sizes, radii, centers, rotation_axis_angles, quaternions, colors, "
-    "line_radii, fill_mode, labels, show_labels, class_ids",
-    "Cylinders3D": "*, lengths, radii, centers, rotation_axis_angles, quaternions, colors, "
-    "line_radii, fill_mode, labels, show_labels, class_ids",
+    "TextLog": "text, *, level=, color=",
+    "LineStrips3D": "strips, *, radii=, colors=, labels=, show_labels=, class_ids=",
+    "Points3D": (
+        "positions, *, radii=, colors=, labels=, show_labels=, point_shading=, "
+        "class_ids=, keypoint_ids="
+    ),
+    "Boxes3D": (
+        "*, sizes=, mins=, half_sizes=, centers=, rotation_axis_angles=, quaternions=, "
+        "rotations=, colors=, radii=, fill_mode=, labels=, show_labels=, class_ids="
+    ),
+    "Ellipsoids3D": (
+        "*, half_sizes=, radii=, centers=, rotation_axis_angles=, quaternions=, colors=, "
+        "line_radii=, fill_mode=, labels=, show_labels=, class_ids="
+    ),
+    "Cylinders3D": (
+        "*, lengths=, radii=, centers=, rotation_axis_angles=, quaternions=, colors=, "
+        "line_radii=, fill_mode=, labels=, show_labels=, class_ids="
+    ),
 }
+"""Names of parameters by call; `=` behind what may be left out."""
 EACH = {
     "LineStrips3D": ("strips", "colors"),
     "Points3D": ("positions", "labels", "colors"),
@@ -45,7 +58,7 @@ EACH = {
 
 
 def parameters_of(function: Any) -> str:
-    """The names of a call's parameters, without `self`, as `RECORDED` writes them."""
+    """The parameters of a call, without `self`, as `RECORDED` writes them."""
     names, keyword_only = [], False
     for one in inspect.signature(function).parameters.values():
         if one.name == "self":
@@ -53,7 +66,8 @@ def parameters_of(function: Any) -> str:
         if one.kind is one.KEYWORD_ONLY and not keyword_only:
             names += ["*"]
         keyword_only = keyword_only or one.kind in (one.KEYWORD_ONLY, one.VAR_POSITIONAL)
-        names.append(f"*{one.name}" if one.kind is one.VAR_POSITIONAL else one.name)
+        star = "*" if one.kind is one.VAR_POSITIONAL else ""
+        names.append(f"{star}{one.name}{'' if one.default is one.empty else '='}")
     return ", ".join(names)
 
 
@@ -64,17 +78,8 @@ def bound(call: str, *args: Any, **kwargs: Any) -> dict[str, Any]:
         TypeError: It has no such parameter.
     """
     scope: dict[str, Any] = {}
-    exec(f"def call({_with_defaults(RECORDED[call])}): ...", scope)
+    exec(f"def call({RECORDED[call].replace('=', '=None')}): ...", scope)
     return inspect.signature(scope["call"]).bind(*args, **kwargs).arguments
-
-
-def _with_defaults(parameters: str) -> str:
-    """Everything behind a star may be left out."""
-    parts, starred = [], False
-    for name in filter(None, parameters.split(", ")):
-        parts.append(f"{name}=None" if starred and not name.startswith("*") else name)
-        starred = starred or name.startswith("*")
-    return ", ".join(parts)
 
 
 class Library(ModuleType):
