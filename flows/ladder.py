@@ -28,6 +28,7 @@ from genpolicy.integrity.documents import read_yaml
 
 BELOW = ("a", "b", "c", "d")
 """Gates that machines judge alone."""
+GATES = (*BELOW, WAITS)
 
 
 def stages_by_gate(pipeline: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -93,11 +94,11 @@ def run_ladder(workspace: Path) -> int:
     if not server_is_there():
         return EXIT_FAULT
     plan = stages_by_gate(read_yaml(workspace / "dvc.yaml"))
-    if unknown := sorted(set(plan) - {*BELOW, WAITS}):
+    if unknown := sorted(set(plan) - set(GATES)):
         raise ConfigError(
             where="dvc.yaml",
             found=f"with the gates {', '.join(unknown)}",
-            expected=f"only {', '.join((*BELOW, WAITS))}",
+            expected=f"only {', '.join(GATES)}",
             action="Correct the names of the stages.",
         )
     print(estimate(workspace), flush=True)

@@ -1,18 +1,26 @@
 """From the measured table to the virtual clock's models."""
 
+from dataclasses import fields
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.evidence.reproducibility import latency
 from genpolicy.evidence.reproducibility.latency import (
     DRAWN,
     LEVELS,
+    PROCESSES,
+    RUNS,
     declared_rows,
     latency_models,
+    measure_all,
     model_rows,
 )
+from genpolicy.evidence.reproducibility.processor import Machine
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm
 from genpolicy.seeds import stream
@@ -41,6 +49,28 @@ def table(methods=("a", "b"), *, warm=20, cold=2):
             }
         )  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def test_methods_and_runs_take_turns_and_how_far_it_is_is_said_between_two(monkeypatch):
+    happened = []
+
+    def in_fresh_process(work, plan, judged):
+        happened.append(judged.name)
+        return [], Machine(**dict.fromkeys([field.name for field in fields(Machine)], 0))
+
+    def counting(total, what):
+        for done in range(total):
+            happened.append((done, total))
+            yield done
+
+    monkeypatch.setattr(latency, "in_fresh_process", in_fresh_process)
+    monkeypatch.setattr(latency, "counting", counting)
+    taken = measure_all(None, [SimpleNamespace(name="a"), SimpleNamespace(name="b")])
+    turns = [(row.process, row.run, row.method) for row in taken.machine]
+    assert turns == [(process, run, name) for process in PROCESSES for run in RUNS for name in "ab"]
+    assert happened == [
+        said for done, (*_, name) in enumerate(turns) for said in ((done, len(turns)), name)
+    ]
 
 
 def test_models_hold_the_sorted_warm_times_of_both_runs():
