@@ -110,7 +110,8 @@ def test_help_loads_nothing_heavy(metadata, words) -> None:
 @pytest.mark.parametrize(
     ("module", "same"),
     [("genpolicy", []), ("gates", ["gates"]), ("flows.reproduce", ["reproduce"]),
-     ("flows.ladder", ["ladder"]), ("flows.workspace", ["workspace"]), ("flows.serve", ["serve"])],
+     ("flows.ladder", ["ladder"]), ("flows.workspace", ["workspace"]), ("flows.serve", ["serve"]),
+     ("flows.resume", ["resume"])],
 )  # fmt: skip
 def test_a_module_is_the_same_command_under_another_name(metadata, module, same, capsys) -> None:
     path = os.pathsep.join([str(metadata), str(ROOT)])
