@@ -96,6 +96,7 @@ BOUNDS: tuple[Bound, ...] = (
     *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
     *_counts("B", "numbers that mean something else command something else", "conformance"),
     Bound("B", "samples_difference", "<=", 1e-5, f"{PINNED}; so much differs between machines"),
+    Bound("B", "varied_difference", "<=", 1e-4, "a sample of its company or turn is not its own"),
     *_counts("B", "a comparison with other settings compares nothing", "unmatched_keys"),
     *_counts("B", "an unknown term of the latency is not zero", "latency_terms_missing"),
     Bound("B", "gate_b.mode_minimum_share", ">=", 0.05, "one sample of twenty is there by luck"),

@@ -97,8 +97,8 @@ CHECKPOINTS = (
     Checkpoint(
         "sampling", "model", "schedule, solver, NFE, seed", "versioned sampler log",
         "only microbenchmark evidence",
-        (*_of("B", "unpinned_items nonfinite_weights samples_difference nfe_mismatch "
-              "mode_coverage_lower outside_modes_upper"),
+        (*_of("B", "unpinned_items nonfinite_weights samples_difference varied_difference "
+              "nfe_mismatch mode_coverage_lower outside_modes_upper"),
          *_of("D", "nominal_success_lower stress_success_lower latency_p95_s")),
     ),
     Checkpoint(

@@ -18,7 +18,7 @@ ONE_TRAINING = "what another training would do: there is one training seed, and 
 
 def noise_and_starts(look: Look) -> None:
     """Is it the sampler's noise, or are the starts not the same?"""
-    look.criteria("B.samples_difference", "D.unmatched_starts")
+    look.criteria("B.samples_difference", "B.varied_difference", "D.unmatched_starts")
     look.ask(_starts)
     look.unknown.append(ONE_NOISE)
 

@@ -29,6 +29,7 @@ from gates.pages import (
     plots_stress,
     plots_time,
     tables_clocks,
+    tables_compute,
     tables_faults,
     tables_feasibility,
     tables_holds,
@@ -40,6 +41,7 @@ from gates.pages import (
     tables_severity,
     tables_stress,
     tables_survival,
+    tables_variations,
 )
 from gates.pages.clips import clips_of
 from gates.pages.desk import desk_of
@@ -70,8 +72,10 @@ MARKS = {
 PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
     "B": (
+        tables_variations.LISTING,
         *plots_convergence.PLOTS,
         tables_matching.RULES,
+        tables_compute.LISTING,
         *plots_time.PLOTS,
         tables_overruns.DECLARED,
         tables_machine.BESIDE,
@@ -158,6 +162,7 @@ def identities(evidence: Evidence, report: GateReport) -> Identities | None:
         _item(item.name): tuple(_said(getattr(known[name].card, item.name)) for name in names)
         for item in dataclasses.fields(IdentityCard)
     }
+    rows = {"checkpoint": tuple(_said(known[name].checkpoint) for name in names), **rows}
     differ = tuple((key, *said) for key, said in rows.items() if len(set(said)) > 1)
     shared = tuple((key, said[0]) for key, said in rows.items() if len(set(said)) == 1)
     return Identities((("", *names), *differ), shared)

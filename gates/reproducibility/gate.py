@@ -10,7 +10,8 @@ from gates.engine import GateSpec, Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
-from gates.reproducibility import conformance, convergence, modes, timing
+from gates.reproducibility import conformance, convergence, modes, timing, variations
+from gates.reproducibility.compute import cost_of, cost_said, miscounted
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.matching import matched_by
@@ -65,8 +66,9 @@ def parameter_budget_deviation(
     own = _parameters(evidence, GENERATORS, candidate)
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
-    text = f"{own:g} parameters, budget {budget:g} ({reference})"
     config = _config(evidence, candidate)
+    text = f"{own:g} parameters, budget {budget:g} ({reference}); "
+    text += cost_said(cost_of(evidence, candidate, config))
     if isinstance(config, DistilledConfig):
         text = f"{text}; {spent(config.distilled)}"
     return Measured(abs(own / budget - 1.0), caveat=text)
@@ -110,7 +112,9 @@ def unpinned_items(
         missing.append("checkpoint file")
     if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
-    missing += unrecorded(entry.card) + contradicted(entry, _config(evidence, candidate))
+    config = _config(evidence, candidate)
+    missing += unrecorded(entry.card) + contradicted(entry, config)
+    missing += miscounted(cost_of(evidence, candidate, config), config)
     if entry.card.device != settings.device:
         missing.append(f"device: ran on {entry.card.device}, compute.device is {settings.device}")
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
@@ -286,7 +290,12 @@ GATE = GateSpec(
     gate="B",
     settings=ReproducibilitySettings,
     criteria=criteria_of(
-        globals(), vars(conformance), vars(convergence), vars(modes), vars(timing)
+        globals(),
+        vars(variations),
+        vars(conformance),
+        vars(convergence),
+        vars(modes),
+        vars(timing),
     ),
     bind=(
         f"{RELOAD}/offline.parquet",

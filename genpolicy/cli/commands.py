@@ -282,6 +282,10 @@ def serve_candidate(
     width: Annotated[
         list[str] | None, typer.Option(help="NAME=NUMBER: how wide an input is.")
     ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(min=1, max=256, help="Of a program's operators; as the entry says if absent."),
+    ] = None,
 ) -> int:
     """Host the candidate of an entry.
 
@@ -291,7 +295,7 @@ def serve_candidate(
     """
     from genpolicy.cli.serving import run_host
 
-    return run_host(entry, port=port, sha256=sha256, widths=width or [])
+    return run_host(entry, port=port, sha256=sha256, widths=width or [], threads=threads)
 
 
 def check_candidate(

@@ -25,14 +25,17 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None, device: str) -
     return _listen(ServedPolicy(policy), policy.method, port)
 
 
-def run_host(path: Path, *, port: int, sha256: str | None, widths: list[str]) -> int:
+def run_host(
+    path: Path, *, port: int, sha256: str | None, widths: list[str], threads: int | None
+) -> int:
     """Serve what an entry names on this machine until an interrupt. Returns the exit code.
 
     Raises:
         ConfigError: Nobody may listen on that port, or a width that is none.
         BadInputError: The entry or a file of it is missing, wrong, or another one.
     """
-    served = hosted(path, sha256=sha256, widths=dict(_width(said) for said in widths))
+    known = dict(_width(said) for said in widths)
+    served = hosted(path, sha256=sha256, widths=known, threads=threads)
     return _listen(served, str(path), port)
 
 

@@ -39,6 +39,7 @@ from genpolicy.audit.rows import (
 )
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.candidates.votes import VOTE_CHECKS
+from genpolicy.contract.action import ACTION_COMPONENTS
 from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.evidence.rows.brought import AFTER, BEFORE, AnswerRow, FixtureAgainRow
 from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow, ClockTickRow
@@ -50,7 +51,9 @@ from genpolicy.evidence.rows.need import (
     OfflineRow,
 )
 from genpolicy.evidence.rows.reproducibility import (
+    VARIATIONS,
     CandidatesRow,
+    ComputeRow,
     CoverageRow,
     DensityRow,
     LatencyModelRow,
@@ -59,6 +62,7 @@ from genpolicy.evidence.rows.reproducibility import (
     NfeRow,
     SampleRow,
     SweepLatencyRow,
+    VariationRow,
 )
 from genpolicy.evidence.rows.shadow import (
     CandidateRow,
@@ -272,6 +276,7 @@ PARAMS: dict[str, Any] = {
             nonfinite_weights=(0, "model"),
             metadata_mismatches=(0, "model"),
             samples_difference=(0, "model"),
+            varied_difference=(1e-5, "model"),
             nfe_mismatch=(0, "model"),
             conformance=(0, "model"),
             mode_coverage_lower=(0.6, "model"),
@@ -1099,6 +1104,28 @@ def _reload(root: Path) -> None:
             for i in range(8)
         ],
     )
+    table(root, "reload/variations.parquet", VariationRow, [
+        {
+            "method": m,
+            "seed": 0,
+            "device": "cpu",
+            "variation": way,
+            "component": component,
+            "chunks": 8 if way == "alone" else 16,
+            "unequal": 0,
+            "max_abs_difference": 0.0,
+            "unknown": "",
+        }
+        for m in CANDIDATES
+        for way in VARIATIONS
+        for component in ACTION_COMPONENTS
+    ])  # fmt: skip
+    counted = {"encoder": (10, 1), "trunk": (80, 1), "head": (10, 1), "update": (0, 9)}
+    table(root, "reload/compute.parquet", ComputeRow, [
+        {"method": m, "seed": 0, "part": part, "parameters": parameters, "operations": operations}
+        for m in CANDIDATES
+        for part, (parameters, operations) in counted.items()
+    ])  # fmt: skip
     # Nobody is brought; fixtures that were asked again are there for tests that bring one of them.
     document(root, "reload/conformance.json", {})
     table(root, "reload/answers.parquet", AnswerRow, [])

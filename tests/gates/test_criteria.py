@@ -224,6 +224,10 @@ WORSE = {
                 )
             ),
         ),
+        "varied_difference": _table(
+            "reload/variations.parquet",
+            lambda s: lambda f: cells("unequal", 1)(cells("max_abs_difference", s)(f)) if s else f,
+        ),
         "nfe_mismatch": _table(
             "reload/nfe.parquet", lambda s: cells("counted", 8 + int(8 * s) + 1)
         ),
@@ -369,7 +373,14 @@ TABLES = {
         "measure_baselines/modes",
         "measure_factors/modes",
     ],
-    "B": ["reload/samples", "reload/nfe", "reload/modes", "latency/latency"],
+    "B": [
+        "reload/samples",
+        "reload/variations",
+        "reload/compute",
+        "reload/nfe",
+        "reload/modes",
+        "latency/latency",
+    ],
     "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],
     "D": [
         "stress/rollouts",
@@ -440,6 +451,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
         ("A", "audit/strata", "p_adjusted"),
         ("A", "audit/predictions", "told_upper"),
         ("B", "reload/samples", "max_abs_difference"),
+        ("B", "reload/variations", "max_abs_difference"),
         ("B", "reload/modes", "fewest_admissible"),
         ("B", "reload/modes_earlier", "valid"),
         ("B", "train_baselines/chunked_bc/seed_0/validation", "loss"),

@@ -55,7 +55,7 @@ def test_what_guards_people_or_the_proof_always_applies():
     }  # fmt: skip
     assert always["B"] == {
         "unpinned_items", "metadata_mismatches", "nfe_mismatch", "nonfinite_weights",
-        "samples_difference", "conformance",
+        "samples_difference", "varied_difference", "conformance",
     }  # fmt: skip
     assert always["C"] == {
         "stub_stale", "stub_invalid", "stub_violation_upper", "conservation_error",

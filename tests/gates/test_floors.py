@@ -22,6 +22,7 @@ GOLDEN = {
           "cause_accepted": 1},
     "B": {"unpinned_items": 0, "metadata_mismatches": 0, "nfe_mismatch": 0,
           "nonfinite_weights": 0, "conformance": 0, "samples_difference": 1e-5,
+          "varied_difference": 1e-4,
           "unmatched_keys": 0, "latency_terms_missing": 0, "gate_b.mode_minimum_share": 0.05,
           "mode_coverage_lower": 0.25, "outside_modes_upper": 0.4, "late_change_upper": 0.2,
           "baseline_fall_upper": 0.25, "warm_latency_ratio_upper": 3,

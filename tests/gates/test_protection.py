@@ -208,6 +208,7 @@ def test_the_false_promotion_of_every_recovery_failed_is_not_two_lines_away(ladd
     [
         ("B", "nonfinite_weights", 1), ("B", "samples_difference", 0.01),
         ("B", "unpinned_items", 1), ("B", "metadata_mismatches", 1), ("B", "nfe_mismatch", 1),
+        ("B", "varied_difference", 0.01),
         ("C", "gate_c.mode_observations", 29), ("D", "force_peak_p95_n", 1e6),
         ("D", "intervention_upper", 1.0), ("D", "reset_upper", 1.0),
         ("D", "verdict_reachable", 0), ("D", "stress.starts", 2),
@@ -247,8 +248,8 @@ def test_a_limit_of_every_phase_is_held_to_the_bound():
     ("gate", "name"),
     [
         ("B", "nonfinite_weights"), ("B", "samples_difference"), ("B", "unpinned_items"),
-        ("B", "metadata_mismatches"), ("B", "nfe_mismatch"), ("D", "verdict_reachable"),
-        ("D", "unmatched_starts"),
+        ("B", "metadata_mismatches"), ("B", "nfe_mismatch"), ("B", "varied_difference"),
+        ("D", "verdict_reachable"), ("D", "unmatched_starts"),
     ],
 )  # fmt: skip
 def test_what_proves_a_candidate_applies_to_every_cell(gate, name):

@@ -29,13 +29,16 @@ from genpolicy.policies.policy import NetworkPolicy
 HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
 
 
-def hosted(path: Path, *, sha256: str | None, widths: Mapping[str, int]) -> Served:
+def hosted(
+    path: Path, *, sha256: str | None, widths: Mapping[str, int], threads: int | None = None
+) -> Served:
     """Who answers for an entry.
 
     Args:
         path: The entry.
         sha256: What the entry must say; None for whatever it says.
         widths: Numbers of each input, where they are known.
+        threads: Of a program's operators, in place of those of the entry; None: those.
 
     Raises:
         ConfigError: The entry is wrong, of a kind that is hosted elsewhere, or lacks a library.
@@ -55,7 +58,7 @@ def hosted(path: Path, *, sha256: str | None, widths: Mapping[str, int]) -> Serv
         policy = loaded_on(entry.device, folder / entry.checkpoint)
         return ServedPolicy(policy, samplers=_chosen(policy, entry.samplers))
     if isinstance(entry, ProgramEntry):
-        return _program(entry, folder, widths)
+        return _program(entry, folder, widths, threads or entry.threads)
     if isinstance(entry, ScriptedEntry):
         call = scripted_function(
             _bytes(entry, folder, entry.file), path=str(folder / entry.file),
@@ -83,9 +86,11 @@ def _chosen(policy: NetworkPolicy, choices: Mapping[str, Choice]) -> dict[str, N
     return found
 
 
-def _program(entry: ProgramEntry, folder: Path, widths: Mapping[str, int]) -> HostedPolicy:
-    program = _loaded(entry, folder, entry.program)
-    encoder = _loaded(entry, folder, entry.encoder.program) if entry.encoder else None
+def _program(
+    entry: ProgramEntry, folder: Path, widths: Mapping[str, int], threads: int
+) -> HostedPolicy:
+    program = _loaded(entry, folder, entry.program, threads)
+    encoder = _loaded(entry, folder, entry.encoder.program, threads) if entry.encoder else None
     check_ports(entry, program, encoder, widths)
     evaluations = None
     if entry.counted_weight is not None:
@@ -107,12 +112,12 @@ def _program(entry: ProgramEntry, folder: Path, widths: Mapping[str, int]) -> Ho
     return HostedPolicy(entry, program.run, encode=encode, evaluations=evaluations, widths=widths)
 
 
-def _loaded(entry: ProgramEntry, folder: Path, name: str) -> Program:
+def _loaded(entry: ProgramEntry, folder: Path, name: str, threads: int) -> Program:
     data, where = _bytes(entry, folder, name), str(folder / name)
     if isinstance(entry, TorchEntry):
         from genpolicy.candidates.hosts.torch_program import TorchProgram  # noqa: PLC0415
 
-        return TorchProgram(data, where=where, threads=entry.threads)
+        return TorchProgram(data, where=where, threads=threads)
     assert isinstance(entry, OnnxEntry)  # there is no third kind of program
     require_onnx("onnx", "onnxruntime")
     from genpolicy.candidates.hosts.onnx_program import OnnxProgram  # noqa: PLC0415
@@ -120,7 +125,7 @@ def _loaded(entry: ProgramEntry, folder: Path, name: str) -> Program:
     def external(location: str) -> bytes:
         return _bytes(entry, folder, (Path(name).parent / location).as_posix())
 
-    return OnnxProgram(data, where=where, threads=entry.threads, external=external)
+    return OnnxProgram(data, where=where, threads=threads, external=external)
 
 
 def _bytes(entry: Entry, folder: Path, name: str) -> bytes:

@@ -4,7 +4,7 @@ import re
 import sys
 from pathlib import Path
 
-from genpolicy.candidates.hosts.kinds import LeRobotEntry
+from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry
 from genpolicy.candidates.wire.channels import columns_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
@@ -24,13 +24,16 @@ HERE = (
 is installed and behind Python's own modules, none of which a file beside ours may replace."""
 
 
-def as_server(entry: Entry, path: Path, contract: ObservationContract) -> ServerEntry:
+def as_server(
+    entry: Entry, path: Path, contract: ObservationContract, *, threads: int | None = None
+) -> ServerEntry:
     """The entry of the server that hosts a candidate; a server is its own.
 
     Args:
         entry: What it is.
         path: Its file, which the child reads again and holds against this entry.
         contract: The observation in force, which says how wide its inputs are.
+        threads: Of a program's operators, in place of those of its entry; None: those.
 
     Raises:
         ConfigError: Nothing on this machine runs it.
@@ -41,6 +44,8 @@ def as_server(entry: Entry, path: Path, contract: ObservationContract) -> Server
     entry.require_host()
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
     command = _lerobot(entry) if isinstance(entry, LeRobotEntry) else _own(entry, path, contract)
+    if threads is not None and isinstance(entry, ProgramEntry):
+        command += ["--threads", str(threads)]
     return ServerEntry(**common, kind="server", command=command)
 
 

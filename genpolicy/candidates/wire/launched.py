@@ -6,8 +6,10 @@ import shutil
 import signal
 import subprocess
 import time
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
+from types import MappingProxyType
 
 from genpolicy.candidates.wire.connection import LOOPBACK, dial, free_port
 from genpolicy.candidates.wire.entry import PORT, ServerEntry
@@ -24,6 +26,7 @@ PORTS = 3
 """Free ports that are tried: between the choice of one and the server, somebody may take it."""
 MARK = "GENPOLICY_LAUNCH"
 """In the environment of a server, so that what it starts is found whatever session it is in."""
+NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def require_program(entry: ServerEntry, folder: Path) -> None:
@@ -58,6 +61,7 @@ class Launched(AbstractContextManager["Launched"]):
     Args:
         entry: What it is.
         folder: Of the entry's file; the command runs there.
+        environment: Variables that it is given besides.
 
     Attributes:
         address: Where it listens.
@@ -67,10 +71,13 @@ class Launched(AbstractContextManager["Launched"]):
         PolicyError: It ended, or did not listen in time.
     """
 
-    def __init__(self, entry: ServerEntry, folder: Path) -> None:
+    def __init__(
+        self, entry: ServerEntry, folder: Path, *, environment: Mapping[str, str] = NOTHING
+    ) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._printed: Printed | None = None
         self._mark = secrets.token_hex(16)
+        self._environment = {**environment, MARK: self._mark}
         if entry.command is None:
             assert entry.address is not None  # an entry has one of the two
             self.address = entry.address
@@ -130,7 +137,7 @@ class Launched(AbstractContextManager["Launched"]):
         self._printed = Printed()
         try:
             self._process = _begin(
-                words, folder, self._printed.write_end, {MARK: self._mark}, entry.name
+                words, folder, self._printed.write_end, self._environment, entry.name
             )
         except BaseException:
             self._printed.close()
@@ -175,13 +182,13 @@ def _taken(port: int) -> bool:
 
 
 def _begin(
-    words: list[str], folder: Path, printed: int, mark: dict[str, str], name: str
+    words: list[str], folder: Path, printed: int, environment: dict[str, str], name: str
 ) -> "subprocess.Popen[bytes]":
     """In a session of its own, so that an interrupt here lets us end it in order."""
     try:
         return subprocess.Popen(
             words, cwd=folder, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed,
-            env={**os.environ, **mark}, start_new_session=True,
+            env={**os.environ, **environment}, start_new_session=True,
         )  # fmt: skip
     except OSError as error:
         raise ConfigError(

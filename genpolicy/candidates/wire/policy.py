@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 GONE_AFTER = 8
 """Faults in a row after which it is asked no more: each may cost a whole timeout."""
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""By which a process is told how many threads its arithmetic has."""
 OWN_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
 """What happens in its process."""
 
@@ -241,8 +243,9 @@ class WirePolicy:
 
 @contextmanager
 def running(
-    brought: BroughtPolicy, contract: ObservationContract, *, scene: Path | None = None
-) -> Iterator[WirePolicy]:
+    brought: BroughtPolicy, contract: ObservationContract, *, scene: Path | None = None,
+    threads: int | None = None,
+) -> Iterator[WirePolicy]:  # fmt: skip
     """A brought policy, its files verified, its server started here and ended.
 
     One that does not start, or says what it can in a way that is none, is a policy all of whose
@@ -252,6 +255,8 @@ def running(
         brought: Who it is.
         contract: The observation in force.
         scene: The MJCF that describes the robot; None where nobody knows it.
+        threads: What its process is told to use, in place of what it is declared with; a program
+            obeys, a server may not. None leaves it as it is.
 
     Raises:
         IntegrityError: A file of it is another one.
@@ -260,11 +265,12 @@ def running(
     """
     folder: Path = brought.folder
     verify_files(brought.entry, folder)
-    entry = as_server(brought.entry, brought.path, contract)
+    entry = as_server(brought.entry, brought.path, contract, threads=threads)
+    told = {} if threads is None else dict.fromkeys(THREAD_VARIABLES, str(threads))
     with ExitStack() as stack:
         remote: RemotePolicy | PolicyError
         try:
-            server = stack.enter_context(Launched(entry, folder))
+            server = stack.enter_context(Launched(entry, folder, environment=told))
             remote = RemotePolicy(entry, server.address, contract, scene=scene, ended=server.died)
             stack.callback(remote.close)
         except PolicyError as fault:

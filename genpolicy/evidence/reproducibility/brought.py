@@ -2,6 +2,7 @@
 
 It is started twice. Between the two nothing is left of it, and the second time it is asked in the
 opposite order: what depends on who was asked before, or on a seed of its own, answers otherwise.
+A third start has other threads, and is asked alone, beside others and in another order.
 """
 
 from collections import Counter
@@ -35,9 +36,15 @@ from genpolicy.evidence.reproducibility.conformance import (
 )
 from genpolicy.evidence.reproducibility.identity import Deployment, rule_sha256
 from genpolicy.evidence.reproducibility.sweep import drawn_by, quality_of, swept_windows
+from genpolicy.evidence.reproducibility.variations import wire_otherwise
 from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow
-from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import (
+    CoverageRow,
+    NfeRow,
+    SampleRow,
+    VariationRow,
+)
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.policies.fixtures import CANDIDATES
 from genpolicy.tasks.api import Task
@@ -80,6 +87,7 @@ class Answered:
         conformance: What its answers at recorded moments say.
         answers: These answers.
         samples: Fixtures, before and after the new start.
+        variations: The same asked for in other ways.
         nfe: Counted network evaluations; empty where its server does not count.
         modes: Two-mode situations.
         coverage: The same in one row, where a sampler is declared; and one of each further setting.
@@ -90,6 +98,7 @@ class Answered:
     conformance: Conformance
     answers: list[AnswerRow] = field(default_factory=list)
     samples: list[SampleRow] = field(default_factory=list)
+    variations: list[VariationRow] = field(default_factory=list)
     nfe: list[NfeRow] = field(default_factory=list)
     modes: list[ModeRow] = field(default_factory=list)
     coverage: list[CoverageRow] = field(default_factory=list)
@@ -129,6 +138,8 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         # What somebody else runs is not started anew by us, and nothing is known of that.
         anew = second_session(policy, starts, session) if candidate.entry.started_here else None
     failed = _failed(before, policy)
+    # On a start of its own too: how it fares otherwise is no fault of who is asked as declared.
+    varied = wire_otherwise(candidate, contract, seen, first.chunks, scene=asked.task.scene_path)
     if candidate.entry.samplers:
         # Behind all that is judged, on a start of its own: one of these settings may hang or die.
         with running(candidate, contract, scene=asked.task.scene_path) as further:
@@ -143,6 +154,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         conformance=conformance_of(starts, told, session, anew, candidates=number),
         answers=answer_rows(candidate.name, starts, session, anew),
         samples=_compared(candidate, first.chunks, again.chunks),
+        variations=varied.rows(candidate.name, seed=candidate.seed, device=_device(candidate)),
         nfe=_evaluations(candidate, first.evaluations, again.evaluations),
         modes=modes,
         coverage=coverage,

@@ -1,5 +1,6 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,9 +17,11 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateId
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.brought import Answered, Asked, ask_brought
+from genpolicy.evidence.reproducibility.compute import compute_rows
 from genpolicy.evidence.reproducibility.fixtures import fixtures_again
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
+from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.reproducibility.sweep import (
     Sweep,
     coverage_row,
@@ -26,9 +29,17 @@ from genpolicy.evidence.reproducibility.sweep import (
     swept_samplers,
     swept_windows,
 )
+from genpolicy.evidence.reproducibility.variations import trained_otherwise
 from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
-from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import (
+    ComputeRow,
+    CoverageRow,
+    DensityRow,
+    NfeRow,
+    SampleRow,
+    VariationRow,
+)
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
@@ -75,6 +86,8 @@ class ReloadRows:
     """Rows of the tables of `reload`."""
 
     samples: list[SampleRow] = field(default_factory=list)
+    variations: list[VariationRow] = field(default_factory=list)
+    compute: list[ComputeRow] = field(default_factory=list)
     nfe: list[NfeRow] = field(default_factory=list)
     coverage: list[CoverageRow] = field(default_factory=list)
     offline: list[OfflineRow] = field(default_factory=list)
@@ -87,6 +100,7 @@ class ReloadRows:
     def take(self, name: str, answered: Answered) -> CandidateIdentity:
         """Add the rows of a policy that was brought; returns who it is."""
         self.samples += answered.samples
+        self.variations += answered.variations
         self.nfe += answered.nfe
         self.modes += answered.modes
         self.coverage += answered.coverage
@@ -97,6 +111,8 @@ class ReloadRows:
     def write(self, folder: Path) -> None:
         """Write every table."""
         write_rows(folder / "samples.parquet", SampleRow, self.samples)
+        write_rows(folder / "variations.parquet", VariationRow, self.variations)
+        write_rows(folder / "compute.parquet", ComputeRow, self.compute)
         write_rows(folder / "nfe.parquet", NfeRow, self.nfe)
         write_rows(folder / "coverage.parquet", CoverageRow, self.coverage)
         write_rows(folder / "offline.parquet", OfflineRow, self.offline)
@@ -139,6 +155,7 @@ def write_reload(
     for candidate in candidates:
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
         differing = _reloaded(plan, candidate, before, rows)
+        rows.compute += compute_rows(candidate)
         policy = candidate.load()
         diverged = _measured(plan, candidate, policy, asked, rows)
         entry = identity[candidate.name]
@@ -148,6 +165,10 @@ def write_reload(
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
             nonfinite_chunks=entry.nonfinite_chunks + diverged,
         )
+    counts = Counter((row.method, row.seed) for row in written)
+    rows.variations += in_fresh_process(
+        trained_otherwise, candidates, plan.dataset, horizons=plan.horizons, counts=counts
+    )
     answered = {other.name: ask_brought(other, asked) for other in brought}
     for name, answers in answered.items():
         identity[name] = rows.take(name, answers)

@@ -4,6 +4,11 @@ from dataclasses import dataclass
 
 FIXTURES_ON = "cpu"
 """Where training draws its fixtures, whatever device it trains on."""
+THREADS, ALONE, TOGETHER, ORDER = VARIATIONS = ("threads", "alone", "together", "order")
+"""Other ways in which fixtures are asked for."""
+PARTS = ("encoder", "trunk", "head")
+UPDATE = "update"
+"""What is counted of a training, beside the parts of the network."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,60 @@ class SampleRow:
     sha256_trained: str
     sha256_reloaded: str
     max_abs_difference: float
+
+
+@dataclass(frozen=True)
+class VariationRow:
+    """`variations.parquet` of reload: one component of the fixtures, asked for in another way.
+
+    Each way changes one thing. `threads`: a process with two threads in place of one. `alone`: one
+    observation and one candidate a call. `together`: twice as many candidates at once. `order`:
+    observations in another order. What was drawn plainly, by the same process, stands against it.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        device: Where it was drawn; of who was brought, where its maker says.
+        variation: What was changed.
+        component: Which number of an action.
+        chunks: Chunks that were compared; 0 where it could not be asked so.
+        unequal: Of them, those that differ in this component.
+        max_abs_difference: Largest difference, in the component's own unit; NaN where one is no
+            number, None where it could not be asked so.
+        unknown: Why it could not be asked so; empty where it was.
+    """
+
+    method: str
+    seed: int
+    device: str
+    variation: str
+    component: str
+    chunks: int
+    unequal: int
+    max_abs_difference: float | None
+    unknown: str
+
+
+@dataclass(frozen=True)
+class ComputeRow:
+    """`compute.parquet` of reload: what a part of a network costs, counted where it runs.
+
+    Operations are multiplications and additions of matrix products.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        part: `encoder`, `trunk` or `head`, of one row: the first once an invocation, the others
+            once a network evaluation. `update`: the loss of one training window and its gradient.
+        parameters: Of the part; of `update`, those that exist in training only.
+        operations: Of the part.
+    """
+
+    method: str
+    seed: int
+    part: str
+    parameters: int
+    operations: int
 
 
 @dataclass(frozen=True)

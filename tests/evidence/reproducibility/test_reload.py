@@ -8,12 +8,22 @@ from gates.reproducibility.identity import unrecorded
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ContractError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
-from genpolicy.evidence.reproducibility import fixtures
+from genpolicy.evidence.reproducibility import fixtures, reload
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
 from genpolicy.evidence.reproducibility.sweep import Quality, coverage_row
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
-from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import (
+    PARTS,
+    UPDATE,
+    VARIATIONS,
+    ComputeRow,
+    CoverageRow,
+    DensityRow,
+    NfeRow,
+    SampleRow,
+    VariationRow,
+)
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies import methods
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
@@ -44,6 +54,14 @@ def test_what_comes_back_is_equal_and_pinned(reloaded):
     samples = read_rows(folder / "samples.parquet", SampleRow)
     assert len(samples) == 3 and {row.max_abs_difference for row in samples} == {0.0}
     assert read_rows(folder / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 2, 2, 2, 2, 2)]
+    varied = read_rows(folder / "variations.parquet", VariationRow)
+    assert {(row.variation, row.unequal, row.max_abs_difference) for row in varied} == {
+        (way, 0, 0.0) for way in VARIATIONS
+    }
+    compute = read_rows(folder / "compute.parquet", ComputeRow)
+    assert [(row.method, row.part) for row in compute] == [
+        ("flow", part) for part in (*PARTS, UPDATE)
+    ]
     identity = CANDIDATES.read(folder)["flow"]
     assert identity.checkpoint == flow.sha256 and identity.checkpoints == [flow.sha256]
     assert identity.metadata_mismatches == identity.nonfinite_weights == 0
@@ -94,7 +112,8 @@ def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(
         return honest(velocity, noise, **settings)
 
     monkeypatch.setattr(methods, "sample_ode", wasteful)
-    monkeypatch.setattr(fixtures, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
+    for module in (fixtures, reload):
+        monkeypatch.setattr(module, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
     rows = fixture_rows(policy, seen, method="flow", seed=0)
     write_rows(tmp_path / "fixtures.parquet", FixtureRow, rows)
@@ -137,6 +156,7 @@ def test_weights_that_give_no_numbers_under_a_sampler_are_rows_and_end_nothing(
         return drawn
 
     diverged = steps
+    monkeypatch.setattr(reload, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
     monkeypatch.setattr(methods, "sample_ode", diverging)
     write_reload(plan, candidates, folder.parent / "fixtures.parquet", tmp_path)
     found = {row.steps: row for row in read_rows(tmp_path / "coverage.parquet", CoverageRow)

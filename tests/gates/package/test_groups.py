@@ -33,6 +33,7 @@ def test_everything_that_is_missing_is_named_at_once(whole):
     [
         "artifacts/latency/latency.parquet",
         "artifacts/reload/samples.parquet",
+        "artifacts/reload/variations.parquet",
         "artifacts/shadow/candidates.parquet",
         "artifacts/stress/rollouts.parquet",
     ],

@@ -1,0 +1,71 @@
+"""What a network and its training cost stands in the report; a count that contradicts is named."""
+
+import evidence
+import pytest
+from asked import asked
+from editing import cells
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.pages.figures import draw_all
+from gates.pages.page import gate_page
+from gates.pages.tables_compute import LISTING, NOT_COUNTED
+from gates.proof import judge
+from gates.reproducibility.compute import COMPUTE
+from gates.reproducibility.gate import parameter_budget_deviation, unpinned_items
+from genpolicy.policies.settings import TrainingConfig
+
+TABLE = COMPUTE.removeprefix("artifacts/")
+BATCH = TrainingConfig().batch_size
+
+
+def of(part):
+    return lambda frame: (frame["method"] == "flow") & (frame["part"] == part)
+
+
+def edit(root, part, column, value):
+    evidence.edit_table(root, TABLE, cells(column, value, where=of(part)))
+
+
+def test_the_report_says_parts_rule_and_operations(ladder):
+    found = asked(ladder, parameter_budget_deviation, "flow", gate="B")
+    assert "encoder 10 and 1, trunk 80 and 1, head 10 and 1" in found.caveat
+    # By hand: 9 operations a window, in each of 4000 updates.
+    assert f"4000 of {BATCH} windows, {9.0 * BATCH * 4000:.3g} operations" in found.caveat
+    assert "no loss stops or selects" in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("part", "column", "value", "said"),
+    [("trunk", "parameters", 81, "parameters of trunk: counted 81, trained as 80"),
+     ("head", "operations", 0, "operations of head: counted 0, trained as 1")],
+)  # fmt: skip
+def test_a_count_that_training_did_not_write_is_not_pinned(ladder, part, column, value, said):
+    edit(ladder, part, column, value)
+    found = asked(ladder, unpinned_items, "flow", gate="B")
+    assert (found.value, found.caveat) == (1.0, said)
+
+
+def test_products_outside_of_layers_contradict_nothing(ladder):
+    edit(ladder, "trunk", "operations", 5)
+    assert asked(ladder, unpinned_items, "flow", gate="B").value == 0.0
+
+
+@pytest.mark.parametrize("part", ["encoder", "update"])
+def test_a_part_that_nobody_counted_is_missing_by_name(ladder, part):
+    evidence.edit_table(ladder, TABLE, lambda frame: frame[~of(part)(frame)])
+    with pytest.raises(MissingEvidenceError, match=f"does not count {part} of flow"):
+        asked(ladder, unpinned_items, "flow", gate="B")
+    report = judge(ladder, "B")
+    assert report.candidates["flow"] == "INCONCLUSIVE"
+
+
+def test_the_page_has_candidates_counted_and_baselines_as_they_say(ladder):
+    report = judge(ladder, "B")
+    (found,) = draw_all((LISTING,), Evidence(ladder), report)
+    lines = {line[0]: line[1:] for line in found.listed[1:]}
+    # The encoder once, trunk and head at each of eight evaluations.
+    assert lines["flow"][:4] == ("10, 1", "80, 1", "10, 1", "17 at NFE 8")
+    assert lines["flow"][4] == f"4000 of {BATCH}" and lines["flow"][-1] == "none"
+    assert lines["chunked_bc"][3] == NOT_COUNTED == lines["chunked_bc"][5]
+    assert lines["flow"][6].startswith("0.04")
+    assert LISTING.title in gate_page(ladder, report)
