@@ -52,7 +52,7 @@ def part_operations(
     if method.reads != "nothing":
         values = torch.zeros(1, *noise_shape(sizes, sampler, config.head))
     time = torch.zeros(1) if method.gains is not None else None
-    with torch.inference_mode(), _by_layer(network) as (counter, spent):
+    with _by_layer(network) as (counter, spent):
         network.evaluate(network.encode(observed), values, time)
     spent["trunk"] += counter.get_total_flops() - sum(spent.values())
     return spent

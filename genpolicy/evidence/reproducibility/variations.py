@@ -65,8 +65,10 @@ class Varied:
         """A row of each way and component of the action."""
         found = []
         for way, (drawn, plain) in self.pairs.items():
-            apart, chunks = np.abs(drawn - plain), drawn.shape[0] * drawn.shape[1]
-            other = drawn != plain  # a number that is none differs from every other one
+            with np.errstate(invalid="ignore"):
+                apart = np.abs(drawn - plain)
+            chunks = drawn.shape[0] * drawn.shape[1]
+            other = ~(apart == 0.0)  # a number that is none differs from every other one
             for place, component in enumerate(ACTION_COMPONENTS):
                 unequal = int(other[..., place].any(axis=2).sum())
                 largest = float(apart[..., place].max())
