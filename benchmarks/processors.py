@@ -69,6 +69,7 @@ def trained(folder: Path, dataset: Path, *, updates: int, seed: int) -> tuple[st
     from genpolicy.data.dataset import load_dataset  # noqa: PLC0415
     from genpolicy.policies.checkpoint import load_checkpoint  # noqa: PLC0415
     from genpolicy.policies.matched_training import training_windows  # noqa: PLC0415
+    from genpolicy.policies.settings import TrainingConfig  # noqa: PLC0415
     from genpolicy.policies.training import train  # noqa: PLC0415
     from genpolicy.policies.training_request import TrainingRequest  # noqa: PLC0415
 
@@ -77,7 +78,7 @@ def trained(folder: Path, dataset: Path, *, updates: int, seed: int) -> tuple[st
     request = TrainingRequest(
         method=own.method, horizons=own.horizons, normalisation=checkpoint.normalisation,
         network=own.network, head=own.head,
-        training=own.training.model_copy(update={"steps": updates}),
+        training=TrainingConfig(**{**own.training.model_dump(), "steps": updates}),
         sampler=own.sampler, provenance=own.provenance, seed=seed,
     )  # fmt: skip
     windows, held_out = (

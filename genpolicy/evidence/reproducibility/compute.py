@@ -45,11 +45,17 @@ def compute_rows(candidate: JudgedPolicy) -> list[ComputeRow]:
 def part_operations(
     network: PolicyNetwork, config: CheckpointConfig, sampler: SamplerConfig
 ) -> dict[str, int]:
-    """Operations of one row, by part; products outside of layers (attention) are the trunk's."""
+    """Operations of one row, by part; products outside of layers (attention) are the trunk's.
+
+    A row of an energy is all candidates of its population.
+    """
     sizes, method = config.dimensions, method_named(config.method)
     observed = torch.zeros(1, sizes.observation_horizon, sizes.observation_dim)
     values = None
-    if method.reads != "nothing":
+    if method.reads == "codes":
+        length = min(config.head.code_dim, sizes.chunk_numbers)
+        values = torch.zeros(1, sampler.population, length)
+    elif method.reads != "nothing":
         values = torch.zeros(1, *noise_shape(sizes, sampler, config.head))
     time = torch.zeros(1) if method.gains is not None else None
     with _by_layer(network) as (counter, spent):
