@@ -13,8 +13,8 @@ from genpolicy.evidence.documents.given import TrainedConfig
 from genpolicy.evidence.rows.reproducibility import PARTS, UPDATE, ComputeRow
 
 COMPUTE = f"{RELOAD}/compute.parquet"
-STOPS = "stops after a number of updates that was written before; no loss stops or selects"
-"""The only rule there is: training measures held-out loss, and does nothing by it."""
+STOPS = "a number that was written before, no loss stops or selects"
+"""The only stopping rule there is: training measures held-out loss, and does nothing by it."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,6 @@ def cost_said(cost: Cost) -> str:
         f"{part} {cost.parameters[part]} and {cost.operations[part]:.3g}" for part in PARTS
     )
     return (
-        f"parameters and operations of one row: {parts}; training {STOPS}: {cost.updates} of "
-        f"{cost.batch} windows, {cost.training:.3g} operations"
+        f"parameters and operations of one row: {parts}; training: {cost.updates} updates "
+        f"({STOPS}) of {cost.batch} windows, {cost.training:.3g} operations"
     )

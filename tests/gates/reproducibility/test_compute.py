@@ -30,7 +30,8 @@ def test_the_report_says_parts_rule_and_operations(ladder):
     found = asked(ladder, parameter_budget_deviation, "flow", gate="B")
     assert "encoder 10 and 1, trunk 80 and 1, head 10 and 1" in found.caveat
     # By hand: 9 operations a window, in each of 4000 updates.
-    assert f"4000 of {BATCH} windows, {9.0 * BATCH * 4000:.3g} operations" in found.caveat
+    assert f"of {BATCH} windows, {9.0 * BATCH * 4000:.3g} operations" in found.caveat
+    assert "training: 4000 updates (a number that was written before" in found.caveat
     assert "no loss stops or selects" in found.caveat
 
 

@@ -100,7 +100,8 @@ def test_the_page_sets_side_by_side_what_differs_and_says_once_what_does_not(lad
     found = identities(Evidence(ladder), report)
     heads, *rows = found.differ
     assert set(heads) == {"", *evidence.CANDIDATES}
-    (row,) = rows
+    checkpoint, row = rows
+    assert checkpoint[0] == "checkpoint" and all(said.endswith("…") for said in checkpoint[1:])
     assert row[0] == "path" and row[heads.index("flow")] == "a path of its own"
     shared = dict(found.shared)
     assert shared["control rate, Hz"] == "20" and shared["deadline, s"] == "0.15"
