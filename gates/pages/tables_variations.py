@@ -21,7 +21,7 @@ def _varied(evidence: Evidence, report: GateReport) -> Table:
     """Of each candidate and way, the largest difference over its training seeds."""
     require_bound(evidence, report, VARIED)
     rows = evidence.rows(VARIED, VariationRow)
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for (method, way), part in rows.groupby(["method", "variation"], sort=False):
         if why := next(filter(None, part["unknown"]), ""):
             lines.append((str(method), str(way), "unknown", why, "", "", ""))
