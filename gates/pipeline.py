@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from gates.recorded import require_form
-from gates.report import GATES, Gate, folders_of, report_path, stage_of
+from gates.report import GATES, Gate, folder_of, report_path, stage_of
 from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json, parse_yaml
@@ -35,7 +35,7 @@ RUNGS: dict[Gate, tuple[str, ...]] = {
     ),
     "B": ("candidates", "train_generators", "reload", "latency"),
     "C": ("shadow",),
-    "D": ("wall_clock", "stress"),
+    "D": ("wall_clock", "stress", "monitors"),
     "E": ("card",),
 }  # fmt: skip
 """Evidence stages between a gate and the one below it."""
@@ -147,7 +147,7 @@ def changed_pages(root: Path, gate: Gate) -> str:
 
 def outputs_of(root: Path, gate: Gate) -> tuple[str, ...]:
     """Every file below the folders of a gate's evidence stages, by path, sorted."""
-    folders = [folder for stage in RUNGS[gate] for folder in folders_of(stage)]
+    folders = [folder_of(stage) for stage in RUNGS[gate]]
     lying = [folder for folder in folders if (root / folder).is_dir()]
     return tuple(sorted({name for folder in lying for name in files_at(root, folder)}))
 
@@ -165,7 +165,7 @@ class Disk:
         found = self.md5(path)
         if found and found == expected:
             return
-        wrote = path.startswith(folders_of(stage))
+        wrote = path.startswith(folder_of(stage))
         raise IntegrityError(
             where=path,
             found="missing" if not found else f"other than recorded (md5 {found[:12]}…)",

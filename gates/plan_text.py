@@ -56,7 +56,7 @@ def _beside(plan: Plan) -> list[str]:
     graded, probed = plan.graded_rollouts, plan.probe_rollouts
     return [
         *([f"{graded:,} beside them of graded sizes (stress.severities),"] if graded else []),
-        *([f"up to {probed:,} after them for the monitors (stress.monitors),"] if probed else []),
+        *([f"up to {probed:,} after them for the monitors (monitors),"] if probed else []),
     ]
 
 

@@ -22,7 +22,7 @@ from gates.stress.rollouts import StressSettings
 from gates.stress.trial import reachable
 from gates.verdicts import judge_criterion, rounded
 from genpolicy.evidence.documents.stress import Power
-from genpolicy.evidence.monitors.settings import monitors_settings
+from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
 from genpolicy.seeds import stream
@@ -107,7 +107,7 @@ class Plan:
         candidates: Names of those that are registered; alpha is shared between them.
         rollouts: Over all methods and conditions: the comparison.
         graded_rollouts: Beside it, of conditions made harder or milder (`stress.severities`).
-        probe_rollouts: After it, under probes and without, for the monitors (`stress.monitors`),
+        probe_rollouts: After it, under probes and without, for the stage `monitors`,
             if every registered candidate is admitted.
         longest_s: Virtual time if each of all these rollouts took its limit, s.
         margin: Gain to be shown.
@@ -163,7 +163,7 @@ def plan_of(root: Path) -> Plan:
     of_condition = len(methods) * settings.planned_starts
     rollouts = of_condition * len(planned.perturbations)
     graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
-    probed = len(settings.candidates) * monitors_settings(planned.monitors).rollouts
+    probed = len(settings.candidates) * section(params, "monitors", MonitorsSettings).rollouts
     power = limits.number(REACHABLE, otherwise=POWER)
     table = power_document(
         planned, candidates=len(settings.candidates), root_seed=settings.root_seed

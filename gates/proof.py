@@ -61,6 +61,7 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "gate_c": None,
     "wall_clock": "C",
     "stress": "C",
+    "monitors": "C",
     "gate_d": None,
     "card": "D",
     "gate_e": None,

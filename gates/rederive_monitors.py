@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from gates.rederive_shadow import TaskSection
-from gates.settings import section_of
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import start_hashes
-from genpolicy.evidence.monitors.settings import monitors_settings
+from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.shadow.tables import checked
@@ -55,7 +54,7 @@ def rederive_monitors(
     folder = root / MONITORS
     if not folder.is_dir():
         return
-    settings = monitors_settings(section_of(params, "stress").get("monitors", {}))
+    settings = section(params, "monitors", MonitorsSettings)
     task = load_task(section(params, "task", TaskSection).name)
     rollouts = read_rows(folder / "rollouts.parquet", RolloutRow)
     scores = read_rows(folder / "scores.parquet", MonitorScoreRow)

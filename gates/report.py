@@ -175,19 +175,14 @@ def stage_of(gate: str) -> str:
     return f"gate_{gate.lower()}"
 
 
-BESIDE = {"stress": ("monitors",)}
-"""Folders that a stage writes beside the one of its name."""
-
-
-def folders_of(stage: str) -> tuple[str, ...]:
-    """Folders of evidence that a stage writes, relative to the repository."""
-    return tuple(f"artifacts/{name}" for name in (stage, *BESIDE.get(stage, ())))
+def folder_of(stage: str) -> str:
+    """Folder of evidence that a stage writes, relative to the repository."""
+    return f"artifacts/{stage}"
 
 
 def writer_of(path: str) -> str:
     """Name of the stage that writes a file `artifacts/<folder>/...`."""
-    folder = path.split("/")[1]
-    return next((stage for stage, names in BESIDE.items() if folder in names), folder)
+    return path.split("/")[1]
 
 
 def report_bytes(report: GateReport) -> bytes:

@@ -1,7 +1,4 @@
-"""Stage `stress`: all methods on identical starts, deadlines and perturbations, in simulation.
-
-Those that were admitted then run under probes, for the monitors (`_monitors`).
-"""
+"""Stage `stress`: all methods on identical starts, deadlines and perturbations, in simulation."""
 
 from pathlib import Path
 
@@ -30,17 +27,15 @@ from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
-from stages._monitors import planned, watch
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
-    """Admit through gate C, then run every method under every perturbation, then the probes."""
+    """Admit through gate C, then run every method under every perturbation."""
     admitted = admit("stress", Path.cwd()).candidates
     require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
-    probed = planned(params)
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     task = load_task(params.task.name)
@@ -85,7 +80,6 @@ def work(params: Params) -> None:
         POWER.write(folder, power)
         if graded := section.severity_rows:
             write_rows(folder / SEVERITIES, SeverityRow, graded)
-    watch(params, probed, comparison, [one for one in judged if one.name in admitted], latency)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ GATE_OF_STAGE = {
          "train_factors", "measure_factors", "gate_a"), "A"),
     **dict.fromkeys(("candidates", "train_generators", "reload", "latency", "gate_b"), "B"),
     **dict.fromkeys(("shadow", "gate_c"), "C"),
-    **dict.fromkeys(("wall_clock", "stress", "gate_d"), "D"),
+    **dict.fromkeys(("wall_clock", "stress", "monitors", "gate_d"), "D"),
     **dict.fromkeys(("card", "gate_e"), "E"),
 }  # fmt: skip
 LAST = {"small": "E", "brought": "A", "signed": "E"}
@@ -33,8 +33,6 @@ _PROOF = {"signed": ("gates", "check", "--through", "E")}
 REFUSES = re.compile(r"Gate (?P<gate>[A-E]) refuses: (?P<what>.*)")
 OUTPUT = re.compile(r"^artifacts/(?P<folder>\w+)/")
 """Begins the refusal of a file in a stage's folder, which comes before any stage."""
-BESIDE = {"monitors": "stress"}
-"""Folders that have not the name of the stage that writes them."""
 REFUSED_CRITERION = re.compile(r"^[a-z_0-9]+(\([a-z_0-9]+\))? is ")
 WAITING = "PENDING_REVIEW"
 
@@ -257,7 +255,7 @@ def refused_by(stage: str, sentence: str) -> Stop | None:
     if refused is None:
         output = OUTPUT.match(sentence)
         if output and not stage:
-            stage = BESIDE.get(output["folder"], output["folder"])
+            stage = output["folder"]
         return Stop(GATE_OF_STAGE.get(stage, "A"), "refusal", sentence or "dvc itself")
     if REFUSED_CRITERION.match(refused["what"]) and not refused["what"].startswith("report"):
         return None

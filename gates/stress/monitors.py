@@ -32,7 +32,7 @@ NO_AUTHORITY = (
     "No monitor has authority: scores are computed from journals after a rollout is over, and no "
     "stop, hold or call for a person in this ladder hangs on one."
 )
-UNWATCHED = "no monitor was looked at: no probe was run (`stress.monitors` in params.yaml)"
+UNWATCHED = "no monitor was looked at: no probe was run (`monitors` in params.yaml)"
 IN_WORDS = {TIME: "the clock", VARIANCE: "the spread of the draws"}
 BLIND = "no monitor could watch it; why stands with the table of monitors"
 Interval = tuple[float, float, float]

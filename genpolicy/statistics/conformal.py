@@ -35,7 +35,7 @@ def conformal_rank(n: int, alpha: float) -> int:
             where="a conformal rank",
             found=f"n = {n}, alpha = {alpha}",
             expected="n >= 0 and 0 < alpha < 1",
-            action="Correct `stress.monitors.alpha`.",
+            action="Correct `monitors.alpha`.",
         )
     # Of decimals as they are written: 1 - 0.1 times 10 is 9, not a hair more.
     return math.ceil((n + 1) * (1 - Fraction(str(alpha))))

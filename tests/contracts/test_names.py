@@ -31,10 +31,6 @@ def test_every_gate_ends_a_row_of_stages() -> None:
     assert tuple(stages_by_gate(pipeline())) == GATES
 
 
-ALSO = {"stress": "monitors"}
-"""Stages that write a second folder, and which: what the monitors say of rollouts of their own."""
-
-
 @pytest.mark.parametrize("stage", stages() or ["a stage in dvc.yaml"])
 def test_a_stage_its_file_its_section_and_its_folder_have_one_name(stage: str) -> None:
     definition = pipeline()["stages"][stage]
@@ -47,7 +43,7 @@ def test_a_stage_its_file_its_section_and_its_folder_have_one_name(stage: str) -
     assert outputs, f"stage {stage} declares no output"
     for name in outputs:
         parts = PurePosixPath(name).parts
-        own_folder = parts[:2] in {("artifacts", stage), ("artifacts", ALSO.get(stage))}
+        own_folder = parts[:2] == ("artifacts", stage)
         own_report = parts[0] == "reports" and parts[-1].split(".")[0] == stage
         assert own_folder or own_report, f"stage {stage} writes {name}"
 

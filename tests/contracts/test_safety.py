@@ -44,7 +44,7 @@ WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/")
 """What scores journals."""
 REPORTS = {
     "gates/diagnosis/of_motion.py", "gates/pages/tables_monitors.py", "gates/rederive_monitors.py",
-    "gates/planning.py", "gates/stress/gate.py", "gates/stress/monitors.py", "stages/_monitors.py",
+    "gates/planning.py", "gates/stress/gate.py", "gates/stress/monitors.py", "stages/monitors.py",
 }  # fmt: skip
 """Who else may know of monitors: what counts their rollouts, scores, proves and reports."""
 JUDGES = tuple(f"gates/stress/{name}.py" for name in ("trial", "cost", "safety", "choice", "gains"))

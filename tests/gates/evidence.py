@@ -19,7 +19,7 @@ from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
-from gates.report import folders_of
+from gates.report import folder_of
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
@@ -222,8 +222,8 @@ PARAMS: dict[str, Any] = {
     "train_factors": {"variants": {name: {} for name in VARIANTS}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "candidates": {},
+    "monitors": watched.SECTION,
     "stress": {
-        "monitors": watched.SECTION,
         "starts": STARTS,
         "baselines": list(COMPARED),
         "perturbations": {name: {} for name in CONDITIONS},
@@ -500,7 +500,7 @@ def record(root: Path) -> None:
     stages, runs = {}, {}
     for gate, names in pipeline.RUNGS.items():
         for name in names:
-            outs = [out for out in folders_of(name) if (root / out).is_dir()]
+            outs = [out for out in [folder_of(name)] if (root / out).is_dir()]
             keys = [name] if isinstance(params, dict) and name in params else []
             stages[name] = {"cmd": name, "deps": [CODE], "params": keys, "outs": outs}
             runs[name] = {

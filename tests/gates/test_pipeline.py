@@ -41,7 +41,7 @@ def test_every_file_of_every_evidence_stage_is_bound(ladder):
     for gate in "ABCDE":
         bound |= set(judge(ladder, gate).materials)
     stages = [stage for names in pipeline.RUNGS.values() for stage in names]
-    folders = [*(f"artifacts/{stage}" for stage in stages), "artifacts/monitors"]
+    folders = [f"artifacts/{stage}" for stage in stages]
     assert set(folders) == {
         path.relative_to(ladder).as_posix()
         for path in (ladder / "artifacts").iterdir()
@@ -56,7 +56,7 @@ def test_every_file_of_every_evidence_stage_is_bound(ladder):
     assert lying and lying <= bound
 
 
-def test_what_stress_writes_beside_its_folder_is_bound_and_its_own(ladder):
+def test_what_monitors_writes_is_bound_and_its_own(ladder):
     """The probes' scores, rollouts, journals: the report names each, and nobody adds one."""
     own = {
         path.relative_to(ladder).as_posix()
@@ -66,15 +66,15 @@ def test_what_stress_writes_beside_its_folder_is_bound_and_its_own(ladder):
     assert {f"artifacts/monitors/{name}.parquet" for name in ("scores", "unavailable")} < own
     assert own <= set(judge(ladder, "D").materials)
     (ladder / "artifacts/monitors/notes.txt").write_text("all fine")
-    judged = r"monitors/notes\.txt is a file that nobody judged.*Run `dvc repro stress` and judge"
+    judged = r"monitors/notes\.txt is a file that nobody judged.*Run `dvc repro monitors` and judge"
     with pytest.raises(RefusedError, match=judged):
         admit("card", ladder)
-    wrote = r"artifacts/monitors is other than recorded.*what `stress` wrote by dvc\.lock"
+    wrote = r"artifacts/monitors is other than recorded.*what `monitors` wrote by dvc\.lock"
     with pytest.raises(IntegrityError, match=wrote):
         judge(ladder, "D")
     (ladder / "artifacts/monitors/notes.txt").unlink()
     (ladder / "artifacts/monitors/scores.parquet").write_bytes(b"other")
-    with pytest.raises(RefusedError, match=r"monitors/scores\.parquet.*Run `dvc repro stress`"):
+    with pytest.raises(RefusedError, match=r"monitors/scores\.parquet.*Run `dvc repro monitors`"):
         admit("card", ladder)
 
 

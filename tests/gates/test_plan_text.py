@@ -55,7 +55,7 @@ def test_what_is_run_beside_the_comparison_is_said_apart():
     lines = plan_text(made(graded=5_400, probed=176)).splitlines()
     assert lines[1:4] == [
         "5,400 beside them of graded sizes (stress.severities),",
-        "up to 176 after them for the monitors (stress.monitors),",
+        "up to 176 after them for the monitors (monitors),",
         "at most 17.5 h of virtual time",
     ]
 

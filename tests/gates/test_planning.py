@@ -33,12 +33,13 @@ TRIALS = 400
 
 @pytest.fixture
 def planned(tmp_path, monkeypatch):
-    """The plan of the checkout with parts of section `stress` changed; few simulated trials."""
+    """The plan of the checkout, parts of `stress` changed, or all of `monitors`; few trials."""
     monkeypatch.setattr(planning, "POWER_TRIALS", TRIALS)
 
-    def plan(**changes):
+    def plan(monitors=None, **changes):
         params = read_params(ROOT)
         params = {**params, "stress": {**params["stress"], **changes}}
+        params["monitors"] = params["monitors"] if monitors is None else monitors
         (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
         return plan_of(tmp_path)
 
@@ -174,7 +175,7 @@ def test_what_is_graded_and_what_is_probed_is_counted_apart(planned):
 
 
 def test_a_plan_of_monitors_that_cannot_be_read_is_bad_configuration(planned):
-    with pytest.raises(ConfigError, match=r"stress\.monitors"):
+    with pytest.raises(ConfigError, match=r"params\.yaml: monitors\.knids"):
         planned(monitors={"knids": ["support"]})
 
 

@@ -24,7 +24,7 @@ SCORES, ROLLOUTS = f"{MONITORS}/scores.parquet", f"{MONITORS}/rollouts.parquet"
 
 @pytest.fixture(scope="module")
 def params(kit):
-    changes = {"stress": {**kit.PARAMS["stress"], "monitors": SECTION}, "seed": ROOT_SEED}
+    changes = {"monitors": SECTION, "seed": ROOT_SEED}
     return {**kit.PARAMS, **changes, "task": {"name": "tabletop_insertion"}}
 
 
@@ -108,4 +108,4 @@ def test_another_finding_of_the_checker_is_refused(root, params):
 
 def test_another_alpha_than_was_asked_is_refused(root, params):
     section = {**SECTION, "alpha": 0.3}
-    refused(root, {**params, "stress": {"monitors": section}}, "alpha|rank")
+    refused(root, {**params, "monitors": section}, "alpha|rank")

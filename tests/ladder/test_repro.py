@@ -9,7 +9,7 @@ GATES = [f"gate_{letter}" for letter in "abcde"]
 EVIDENCE = [
     "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
     "measure_factors", "train_generators", "reload", "latency",
-    "shadow", "wall_clock", "stress",
+    "shadow", "wall_clock", "stress", "monitors",
 ]  # fmt: skip
 
 

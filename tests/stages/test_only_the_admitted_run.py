@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from genpolicy.candidates import judged
-from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.stress import Power
-from stages import _monitors, shadow, stress
+from stages import monitors, shadow, stress
 from stages._stage import load_params
 
 ALL = ("diffusion", "flow")
@@ -107,27 +106,30 @@ def test_stress_rolls_out_what_passed_gate_c(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )
     monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
-    watched = []
-    monkeypatch.setattr(
-        stress, "watch", lambda _, __, ___, admitted, ____: watched.extend(admitted)
-    )
     stress.work(params)
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
     assert {policy.device for policy in ran} == {ELSEWHERE}
-    assert [policy.name for policy in watched] == [name for name in ALL if name != failed]
 
 
-def test_without_probes_there_are_tables_without_rows(evidence, params, monkeypatch):
-    monkeypatch.setattr(_monitors, "write_monitors", None)
-    params.raw["stress"]["monitors"] = {}
-    _monitors.watch(params, _monitors.planned(params), None, (), {})
-    written = evidence / "artifacts" / "monitors"
-    assert len(list(written.glob("*.parquet"))) == 5
-    assert not (written / "journals").exists()
+@pytest.mark.parametrize("failed", [None, *ALL])
+def test_monitors_watch_what_passed_gate_c_and_no_baseline(
+    evidence, stage, gate_evidence, params, weightless, monkeypatch, failed
+):
+    def invalid(frame):
+        hit = frame["method"] == failed
+        return frame.assign(invalid=frame["invalid"].where(~hit, 1))
 
-
-def test_a_key_that_no_monitor_has_is_refused_with_its_place(params):
-    params.raw["stress"]["monitors"] = {"kindz": []}
-    with pytest.raises(ConfigError, match=r"stress\.monitors"):
-        _monitors.planned(params)
+    gate_evidence.edit_table(evidence, "shadow/stub.parquet", invalid)
+    verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    ran = []
+    without(
+        monkeypatch, monitors, "require_one_contract", "load_task", "require_runnable",
+        "latency_models", "write_monitors",
+    )  # fmt: skip
+    monkeypatch.setattr(
+        monitors, "plan_thresholds", lambda _, watched, *__, **___: ran.extend(watched)
+    )
+    monitors.work(params)
+    assert [policy.name for policy in ran] == [name for name in ALL if name != failed]
+    assert {policy.device for policy in ran} == {ELSEWHERE}

@@ -62,7 +62,7 @@ def require_runnable(
     """Refuse probes that cannot be run or scored, before anything else is run for hours.
 
     Args:
-        settings: `stress.monitors`.
+        settings: Section `monitors`.
         joining: The rule of all methods, `stress.joining`.
         task: Makes a world of each probe.
         root_seed: `seed`.
@@ -78,7 +78,7 @@ def require_runnable(
             where=WHERE,
             found=f"probes, and stress.joining: {REAL_TIME}",
             expected="a rule under which what an invocation draws hangs on what it sees alone",
-            action="Leave out the probes (`stress.monitors: {}`), or choose another rule.",
+            action="Leave out the probes (`monitors: {}`), or choose another rule.",
         )
     (text,) = starts_of(task, PROBED, root_seed=root_seed, count=1)
     for name, family in settings.probes.items():

@@ -90,7 +90,7 @@ def scorings(
 
     Args:
         shards: Rollouts that were run.
-        settings: `stress.monitors`.
+        settings: Section `monitors`.
         artifacts: Folder of the stages' outputs.
         other_seeds: Training seeds beside the one that is judged.
 

@@ -1,16 +1,15 @@
-"""`stress.monitors`: which probes are run, and what the monitors are asked."""
+"""Section `monitors`: which probes are run, and what the monitors are asked."""
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from genpolicy.contract.settings import Settings, parse_settings
+from genpolicy.contract.settings import Settings
 from genpolicy.monitors.names import CONTROLS
 from genpolicy.monitors.registry import MONITORS
 
-WHERE = "params.yaml: stress.monitors"
+WHERE = "params.yaml: monitors"
 SEPARATOR = "@"
 """Between a family of probes and its severity, in the name of a condition."""
 THRESHOLDS, JUDGED = "thresholds", "judged"
@@ -39,7 +38,7 @@ class ProbeFamily(Settings):
 
 
 class MonitorsSettings(Settings):
-    """`stress.monitors`; without monitors or without probes nothing is run.
+    """Section `monitors`; without monitors or without probes nothing is run.
 
     Attributes:
         kinds: Monitors beside the two controls, by name.
@@ -99,15 +98,6 @@ class MonitorsSettings(Settings):
             for name, family in self.probes.items()
             for severity in family.severities
         )
-
-
-def monitors_settings(values: Mapping[str, Any]) -> MonitorsSettings:
-    """What stands in `stress.monitors`, whose own section knows nothing of it.
-
-    Raises:
-        ConfigError: An unknown key or a wrong value.
-    """
-    return parse_settings(MonitorsSettings, values, where=WHERE)
 
 
 def condition_of(family: str, severity: float) -> str:

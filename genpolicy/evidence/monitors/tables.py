@@ -50,7 +50,7 @@ def write_monitors(
 
     Args:
         folder: Existing folder; shards write their journals below `journals`.
-        settings: `stress.monitors`, with probes.
+        settings: Section `monitors`, with probes.
         thresholds: Rollouts that set the thresholds.
         judged: Draws the starts of all other rollouts; called after that.
         scoring: Who scores the journals of which shards.

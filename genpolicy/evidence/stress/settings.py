@@ -79,8 +79,6 @@ class StressSettings(Settings):
             of this size must be found.
         joining: How a chunk joins the plan that it takes over from, by one rule for all methods.
         person: Who comes when recovery calls a person; null: nobody, and the call ends a rollout.
-        monitors: What is run under probes and scored afterwards; read by what scores alone, since
-            nothing that runs a policy knows of a monitor.
     """
 
     starts: int = Field(ge=1)
@@ -94,7 +92,6 @@ class StressSettings(Settings):
     planned_effect: tuple[Share, Share]
     joining: JoiningSettings = Field(default_factory=JoiningSettings)
     person: PersonSettings | None = None
-    monitors: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("planned_effect", mode="before")
     @classmethod

@@ -51,7 +51,7 @@ def test_hashes_are_of_every_planned_rollout(task, bench):
 
 def test_a_rule_under_which_nothing_can_be_drawn_again_is_refused(task, bench):
     rule = JoiningSettings(rule="real_time")
-    with pytest.raises(ConfigError, match=r"stress\.monitors is probes.*on what it sees alone"):
+    with pytest.raises(ConfigError, match=r"monitors is probes.*on what it sees alone"):
         require_runnable(bench.settings, rule, task, root_seed=5)
     require_runnable(bench.settings, JoiningSettings(), task, root_seed=5)
     require_runnable(MonitorsSettings(), rule, task, root_seed=5)
@@ -60,6 +60,6 @@ def test_a_rule_under_which_nothing_can_be_drawn_again_is_refused(task, bench):
 def test_a_probe_that_the_task_does_not_know_is_refused_by_its_place(task, bench):
     probes = {**bench.settings.probes, "fog": ProbeFamily(severities=[1.0])}
     settings = bench.settings.model_copy(update={"probes": probes})
-    place = r"params\.yaml: stress\.monitors\.probes\.fog is refused by the task"
+    place = r"params\.yaml: monitors\.probes\.fog is refused by the task"
     with pytest.raises(ConfigError, match=place):
         require_runnable(settings, JoiningSettings(), task, root_seed=5)

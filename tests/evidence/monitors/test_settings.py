@@ -1,4 +1,4 @@
-"""`stress.monitors`: conditions by name, and what is refused."""
+"""Section `monitors`: conditions by name, and what is refused."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def test_conditions_are_named_by_family_and_severity():
 def test_the_rollouts_of_the_default_are_as_many_as_is_said():
     root = Path(__file__).parents[3]
     text = (root / "params.yaml").read_text()
-    found = MonitorsSettings(**yaml.safe_load(text)["stress"]["monitors"])
+    found = MonitorsSettings(**yaml.safe_load(text)["monitors"])
     probed = found.probe_starts * len(found.conditions)
     count = found.threshold_starts + found.judged_starts + probed
     assert f"probes; {count} rollouts of each" in text
