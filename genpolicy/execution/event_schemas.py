@@ -10,12 +10,15 @@ a lie.
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from genpolicy.contract.latency import Term
+
 Json = dict[str, Any]
 
 _TEXT, _WHOLE, _NUMBER, _FLAG = (
     {"type": name} for name in ("string", "integer", "number", "boolean")
 )
 _ANY: Json = {"type": "object", "properties": {}}
+_NUMBERS: Json = {"type": "array", "items": _NUMBER}
 _TYPES: Mapping[str, Json] = {
     **dict.fromkeys(
         ("session", "fallback_hash", "controller_mode", "phase", "calibration_epoch",
@@ -32,7 +35,10 @@ _TYPES: Mapping[str, Json] = {
          "before_ns", "events", "exposed_ns"),
         _WHOLE,
     ),
-    **dict.fromkeys(("force_n", "duration_s"), _NUMBER),
+    **dict.fromkeys(
+        ("force_n", "duration_s", "gripper_m", *(f"{term}_s" for term in Term)), _NUMBER
+    ),
+    **dict.fromkeys(("q_rad", "tcp_m", "tcp_rotation"), _NUMBERS),
     **dict.fromkeys(("used", "in_contact"), _FLAG),
     **dict.fromkeys(
         ("labels", "maximum_age_ns", "late_chunk", "bodies", "parents", "layers", "measures",

@@ -20,6 +20,7 @@ from mcap.writer import CompressionType, Writer
 from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.contract.action import ACTION_DIM
+from genpolicy.contract.latency import Term
 from genpolicy.errors import BadInputError, ContractError
 from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.event_schemas import event_schema, schema_name
@@ -30,7 +31,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 8
+JOURNAL_VERSION = 9
 CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
@@ -43,6 +44,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
                 "fallback_hash", "controller_mode", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "scene": ("bodies",),
+    "state": ("q_rad", "tcp_m", "tcp_rotation", "gripper_m", "force_n"),
     "exposure": ("sha256",),
     "arrived": ("exposed_ns",),
     "phase": ("event_time_ns", "old", "new"),
@@ -51,6 +53,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "controller": ("mode",),
     "invocation": ("id", "stage", "detail"),
     "conditioning": ("id", "exposed_ns", "key", "rows", "history"),
+    "latency": ("id", *(f"{term}_s" for term in Term)),
     "joined": ("chunk_id", "invocation", "rule", "draw", "parents"),
     "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",

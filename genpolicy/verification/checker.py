@@ -7,7 +7,7 @@ was admitted. Where the caller says what the robot is, executed rows are proved 
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
 P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, P8 a person has the arm
 (`attended`), `clock` (no answer before its time), `sensor` (nothing seen before it arrived),
-`conservation`, `journal` (form), `settings` (declared limits).
+`state` (what was measured), `conservation`, `journal` (form), `settings` (declared limits).
 """
 
 import hashlib
@@ -22,6 +22,7 @@ from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.joined import Joined
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.measured import Measured
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
 from genpolicy.verification.world_view import WorldView
@@ -85,6 +86,7 @@ class _Session:
         self.invocations = Invocations()
         self.joined = Joined()
         self.attended = Attended()
+        self.measured = Measured(None if proof is None else proof.forward)
         self.continuity = Continuity()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
@@ -103,6 +105,10 @@ class _Session:
         """Note a violation at the current event."""
         self.report.violations.append(Violation(self.name, self.n, rule, sentence))
 
+    def _flag_all(self, findings: Iterable[tuple[str, str]]) -> None:
+        for rule, sentence in findings:
+            self.flag(rule, sentence)
+
     def read(self, kind: str, m: Message) -> None:
         """Follow one event."""
         self.report.events += 1
@@ -119,13 +125,10 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
-            for rule, text in (*self.invocations.follow(kind, m), *self.attended.follow(kind, m)):
-                self.flag(rule, text)
+            for follower in (self.invocations, self.attended, self.measured):
+                self._flag_all(follower.follow(kind, m))
             self._follow(kind, m)
-            for rule, sentence in self.joined.follow(
-                kind, m, self.world.void_before, self.settings
-            ):
-                self.flag(rule, sentence)
+            self._flag_all(self.joined.follow(kind, m, self.world.void_before, self.settings))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self.flag("journal.malformed", f"A {kind} event cannot be read ({error!r}).")
 
@@ -154,8 +157,7 @@ class _Session:
             for sentence in self.balance.check_end(m, self.n):
                 self.flag("conservation", sentence)
         else:
-            for rule, sentence in self.world.follow(kind, m):
-                self.flag(rule, sentence)
+            self._flag_all(self.world.follow(kind, m))
             if kind == "supervisor" and self.world.stopped:
                 self._answered(self.t)
                 self.unanswered_ns = None
@@ -202,16 +204,14 @@ class _Session:
         self.balance.executed(m["arrival"])
         self._check_bits(chunk, row, m)
         self._check_window(chunk, row)
-        for rule, sentence in self.world.objections(chunk, kind, self.t, self.settings):
-            self.flag(rule, sentence)
+        self._flag_all(self.world.objections(chunk, kind, self.t, self.settings))
         age_ns = self.t - chunk["condition_ns"]
         self.report.oldest_action_ns = max(self.report.oldest_action_ns, age_ns)
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_begin(row, m)
         self._check_order(chunk, row, m)
-        for rule, sentence in self.continuity.follow(chunk, m, self.settings["period_ns"]):
-            self.flag(rule, sentence)
+        self._flag_all(self.continuity.follow(chunk, m, self.settings["period_ns"]))
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
@@ -308,8 +308,7 @@ class _Session:
         motion = chunk["motion"]
         if self.proof is None:
             return
-        for rule, sentence in self.proof.expected.projection.objections(chunk):
-            self.flag(rule, sentence)
+        self._flag_all(self.proof.expected.projection.objections(chunk))
         if motion is None:
             return  # a row of it that is executed is a violation of its own (P6.ground)
         if motion["scene"] != self.world.scene:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from genpolicy.verification.arrived import Arrived
 from genpolicy.verification.journal_source import Message
+from genpolicy.verification.terms import Terms
 
 Finding = tuple[str, str]
 ROUNDING_NS = 1_000
@@ -54,6 +55,7 @@ class Invocations:
     def __init__(self) -> None:
         self._of: dict[str, _Invocation] = {}
         self._arrived = Arrived()
+        self._terms = Terms()
         self._timed = False
         self._failing = ""
 
@@ -64,7 +66,8 @@ class Invocations:
             self._timed = TIMED in m["labels"]
         elif not self._timed:
             return
-        elif kind == "invocation":
+        yield from self._terms.follow(kind, m)
+        if kind == "invocation":
             yield from self._missed(m)
             yield from self._invocation(m)
         elif kind == "conditioning":

@@ -110,6 +110,13 @@ class MotionProof:
         """Somebody else moved the arm: the next row has no executed row before it."""
         self._last.pop(session, None)
 
+    def forward(self, q_rad: Array) -> tuple[Array, Array]:
+        """Position (3,), m, and rotation (3, 3) of the TCP from joint positions (J,), rad."""
+        self._data.qpos[: self._joints] = q_rad
+        mujoco.mj_kinematics(self._model, self._data)
+        rotation = self._data.site_xmat[self._tcp].reshape(3, 3)
+        return self._data.site_xpos[self._tcp].copy(), rotation.copy()
+
     def objections(
         self, session: str, chunk: Message, row: int, *, phase: str, period_s: float
     ) -> Iterator[Finding]:

@@ -109,12 +109,12 @@ class Times:
 
         NaN of an unknown method.
         """
-        return sum(self._terms_s(method, condition, start, number, exposure).values(), start=0.0)
+        return sum(self.terms_s(method, condition, start, number, exposure).values(), start=0.0)
 
-    def _terms_s(
+    def terms_s(
         self, method: str, condition: str, start: int, number: int, exposure: int
     ) -> dict[str, float]:
-        """The same by term, in the order of the flow."""
+        """The same by term, in the order of the flow, s."""
         sensed_s = self.sensed_s(condition, start, exposure)
         hit, measured = self.hit(condition, start, number), self._warm.get(method, {})
         drawn_s = {} if measured else {COLD: math.nan}
@@ -142,7 +142,7 @@ class Times:
         The last one is that which ends it, if any does.
         """
         found, begun_s = [], 0.0
-        for term, drawn_s in self._terms_s(method, condition, start, number, exposure).items():
+        for term, drawn_s in self.terms_s(method, condition, start, number, exposure).items():
             most_s, action = self._deadlines.get(term, (math.inf, GOES_ON))
             if not drawn_s <= most_s:
                 found.append((term, action, begun_s + most_s))
@@ -277,6 +277,8 @@ def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
             sessions[name].sensed.read(kind, m)
         elif kind == "invocation":
             yield from _stated(m, sessions[name], times)
+        elif kind == "latency":
+            yield from _made_of(m, sessions[name], times)
         elif kind == "joined":
             sessions[name].answers[m["chunk_id"]] = m["invocation"]
         elif kind == "candidate":
@@ -316,6 +318,13 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
         return
     if not abs(float(m["detail"]) - owed_s) <= ROUNDING_S:
         yield f"{which} states {float(m['detail']):.9g} s, {owed_s:.9g} s by the measured times"
+
+
+def _made_of(m: Message, session: _Session, times: Times) -> Iterator[str]:
+    own = (session.method, session.condition, session.start, session.numbers[m["id"]])
+    for term, drawn_s in times.terms_s(*own, session.sensed.newest[0]).items():
+        if not abs(float(m[f"{term}_s"]) - drawn_s) <= ROUNDING_S:
+            yield f"{term} of invocation {m['id']!r} states {m[f'{term}_s']} s, {drawn_s:.9g} drawn"
 
 
 def _arrived(m: Message, session: _Session, times: Times) -> Iterator[str]:

@@ -10,6 +10,7 @@ KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
     "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
     "conditioning", "push", "joined", "recovery_force", "person", "exposure", "arrived",
+    "state", "latency",
 })  # fmt: skip
 
 

@@ -33,6 +33,7 @@ from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.exposures import Exposure, Exposures, conditioned_on
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.joined import Joined
+from genpolicy.evidence.stress.measured import Measured
 from genpolicy.evidence.stress.splices import Splice, splice_of
 from genpolicy.evidence.stress.state import InFlight, Outcome, Setup, Tally, in_flight
 from genpolicy.execution.attended import AttendedExecutor
@@ -102,7 +103,7 @@ class Rollout:
         self._seen = self.conditioning = np.zeros(0)
         self._exposures = Exposures(setup, self.journal, start=start_index)
         self._command = Command("hold", "empty")
-        self._measured: deque[Array] = deque(maxlen=2)
+        self._measured = Measured(setup.task, self.world, self.journal)
         self._disturbance = Disturbance(setup, self.world, start=start_index)
         self.executor.set_active(0.0, setup.checkpoint, setup.sampler)
         self.executor.controller(0.0, cell.controller_mode)  # the simulated one has no other
@@ -126,7 +127,7 @@ class Rollout:
         """Observe, supervise, and collect what has been delivered by now."""
         now_s, world = self.now_s, self.world
         self._seen = observation = world.observe()
-        self._measured.append(world.q_meas)
+        self._measured.note(now_s, observation)
         self.journal.scene(now_s, self.setup.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
@@ -227,6 +228,7 @@ class Rollout:
 
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
+        self._measured.note(self.now_s)
         self._deliveries.end(self.now_s)
         self.tally.conclude(self.journal, self.setup.task, outcome, self._seen)
         self.executor.end_episode(self.now_s)
@@ -258,6 +260,7 @@ class Rollout:
         )
         self._joined.begin(flying)
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
+        flying.tell(self.journal, now_s)
         self.journal.conditioning(
             now_s,
             invocation_id=metadata.chunk_id,
@@ -315,11 +318,11 @@ class Rollout:
     def _moment(self) -> Moment:
         return Moment(
             observation=self._seen,
-            q_meas=self._measured[-1],
+            q_meas=self._measured.q_rad,
             commanded=list(self._commanded),
             now_s=self.now_s,
             phase=self.world.phase,
-            q_before=self._measured[0] if len(self._measured) > 1 else None,
+            q_before=self._measured.q_before_rad,
         )
 
     def _session(self, checkpoint: str, sampler: str) -> Session:

@@ -108,6 +108,7 @@ class InFlight:
         arrival_s: When its candidate is judged; later with each one that is refused.
         compute_factor: What compute contention multiplies its measured terms by.
         dropped: Lost on the way.
+        terms_s: What each of the eleven terms takes, s, by name; the first check is one of them.
         chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
         candidate: The candidate that is judged next.
         given_up: Its deadline has passed.
@@ -125,6 +126,7 @@ class InFlight:
     arrival_s: float
     compute_factor: float
     dropped: bool
+    terms_s: Mapping[str, float] = field(default_factory=dict)
     chunks: Array | None = None
     candidate: int = 0
     given_up: bool = False
@@ -153,6 +155,11 @@ class InFlight:
     def total_s(self) -> float:
         """Its end-to-end latency so far: the eleven terms, and every check after the first, s."""
         return self.arrival_s - self.exposed_s
+
+    def tell(self, journal: Journal, now_s: float) -> None:
+        """Put the terms of its latency on record."""
+        terms = {f"{term}_s": float(self.terms_s[term]) for term in Term}
+        journal.add("latency", journal.clock(now_s), {"id": self.metadata.chunk_id, **terms})
 
 
 @dataclass
@@ -235,6 +242,7 @@ def in_flight(
         arrival_s=exposed_s + sum(terms_s.values()),
         compute_factor=hit.compute_factor,
         dropped=hit.dropped,
+        terms_s=terms_s,
         overran=list(overruns(terms_s, setup.execution.term_deadlines)),
     )
 
