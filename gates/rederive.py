@@ -20,6 +20,7 @@ from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_monitors import rederive_monitors
+from gates.rederive_refused import rederive_refused
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.rederive_splices import rederive_splices
@@ -60,6 +61,7 @@ from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.recoveries import KEYS as RECOVERY
+from genpolicy.verification.refused import RefusedCandidates
 from genpolicy.verification.report import JournalReport
 from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.spliced import Spliced
@@ -188,7 +190,8 @@ def _tables(
     with readable(f"{STRESS}/journals"):
         derived = [derived_with_recoveries(path) for path in journals]
         spliced = Spliced(motion.scene_path)
-        tables = derived_tables(journals, spliced)
+        refused = RefusedCandidates()
+        tables = derived_tables(journals, spliced, refused)
     written = root / FAULTS
     stated_faults = read_table(written).to_pylist() if written.is_file() else []
     _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
@@ -201,6 +204,7 @@ def _tables(
         stated = read_table(root / path).to_pylist()
         compare_rows("D", path, keys, stated, rows, seed=seed)
     rederive_splices(root, params, spliced.rows)
+    rederive_refused(root, params, refused, [row for own, _ in derived for row in own.values()])
 
 
 def _faults(params: Mapping[str, Any], stated: Sequence[Row], derived: Sequence[Row]) -> None:

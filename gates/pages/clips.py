@@ -1,11 +1,10 @@
 """Rollouts to watch, on the desk: which ones, by a rule, and what is said of each."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
@@ -19,6 +18,7 @@ from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import GenpolicyError
 from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.stress.worth import worth_watching
 from genpolicy.replay.bodies import DrawnCell
 from genpolicy.replay.film import Film, film_of
 from genpolicy.replay.journal_file import read_session
@@ -84,33 +84,14 @@ def _best(rows: pd.DataFrame, report: GateReport) -> str:
 def _chosen(rows: pd.DataFrame) -> list[tuple[pd.Series, list[str]]]:
     """Rollouts and why each is shown, in the order of the rule; one row once, for all its reasons.
 
-    The rule: the success of median duration of each mode, the slowest success, the largest force,
-    and of each kind of failure that of median duration.
+    Of each of them stress keeps what its layers refused, since the rule is the same.
     """
     rows = rows.sort_values(["seed", "perturbation", "start"], kind="stable").reset_index(drop=True)
-    found: dict[int, list[str]] = {}
-    for place, why in _by_rule(rows):
-        found.setdefault(place, []).append(why)
+    flags(rows, "success")
+    for name in ("duration_s", "force_peak_n"):
+        numbers(rows, name)
+    found = worth_watching(list(rows.itertuples()))
     return [(rows.iloc[place], why) for place, why in found.items()]
-
-
-def _by_rule(rows: pd.DataFrame) -> Iterator[tuple[int, str]]:
-    won = rows[flags(rows, "success")]
-    for mode, own in won.groupby("mode", sort=True):
-        yield _median(own), f"median success of mode {mode}"
-    if len(won):
-        yield int(won.index[int(np.argmax(numbers(won, "duration_s")))]), "slowest success"
-    force = numbers(rows, "force_peak_n")
-    if np.any(force > 0):
-        yield int(np.argmax(force)), "largest force"
-    for outcome, own in rows[~flags(rows, "success")].groupby("outcome", sort=True):
-        yield _median(own), f"{outcome}: median of {len(own)}".replace("_", " ")
-
-
-def _median(rows: pd.DataFrame) -> int:
-    """The row in the middle by duration; of an even number the shorter one."""
-    order = np.argsort(numbers(rows, "duration_s"), kind="stable")
-    return int(rows.index[order[(len(order) - 1) // 2]])
 
 
 def _clip(evidence: Evidence, report: GateReport, row: pd.Series, why: str, number: int) -> Small:

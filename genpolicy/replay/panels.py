@@ -1,7 +1,7 @@
 """The layout that opens a replay: what stands where on a viewer's screen.
 
 A Foxglove or Lichtblick layout as JSON: the cell in 3-D, the log, and over time who commands, the
-phase, the age of actions, the force and the joints.
+phase, the age of actions, what latencies are made of, the force and the joints.
 
 Source: the layout files that both write.
 """
@@ -9,6 +9,7 @@ Source: the layout files that both write.
 from collections.abc import Collection, Iterable
 from typing import Any
 
+from genpolicy.contract.latency import Term
 from genpolicy.data.recording.wire import FRAME
 from genpolicy.replay.timeline import (
     COMMANDED,
@@ -29,7 +30,10 @@ Paths = Iterable[tuple[str, str]]
 
 DRAWN = (SCENE, ROBOT, COMMANDED, RAW, PROJECTED, REJECTED)
 AGES = (("age, ns", "/journal/accept.age_ns"), ("age of fallback, ns", "/journal/fallback.age_ns"))
-FORCES = (("force, each new peak, N", "/journal/force.force_n"),)
+FORCES = (
+    ("force, N", "/journal/state.force_n"), ("force, each new peak, N", "/journal/force.force_n"),
+)  # fmt: skip
+LATENCIES = tuple((f"{term}, s", f"/journal/latency.{term}_s") for term in Term)
 STATES = (
     ("who commands", "/journal/mode.new"),
     ("phase", "/journal/phase.new"),
@@ -58,13 +62,16 @@ def panels(topics: Collection[str], *, joint_count: int, workspace: Workspace) -
         "RosOut!log": {"topicToRender": LOG, "minLogLevel": 1, "searchTerms": []},
         "StateTransitions!states": {"paths": _paths(STATES, topics), "isSynced": True},
         "Plot!ages": _plot(AGES, topics),
+        "Plot!latency": _plot(LATENCIES, topics),
         "Plot!force": _plot(FORCES, topics),
         "Plot!joints": _plot(joints, topics),
     }
     right = _above(
         "StateTransitions!states",
-        _above("Plot!ages", _above("Plot!force", "Plot!joints", 40), 25),
-        25,
+        _above(
+            _above("Plot!ages", "Plot!latency", 50), _above("Plot!force", "Plot!joints", 40), 45
+        ),
+        20,
     )
     return {
         "configById": found,

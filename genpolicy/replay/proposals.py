@@ -1,8 +1,9 @@
 """Proposals that the layers rejected, from the tables beside a journal of shadow.
 
 A journal states a candidate's verdict and the hash of its actions; the actions themselves stand in
-`candidates.parquet`, and what touches what in `gallery.json`. A row is taken only where its actions
-have the hash that the journal states. Journals of stress keep no actions of what was rejected.
+`candidates.parquet`, and what touches what in `gallery.json`. Beside the folder of the journals of
+stress they stand in `refused.parquet`, of failures and of rollouts that are worth a look. A row is
+taken only where its actions have the hash that the journal states.
 """
 
 from collections.abc import Mapping
@@ -17,13 +18,16 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.gallery import GALLERY
 from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.integrity.rows import read_columns
 
 Array = NDArray[np.float64]
+Key = tuple[str, int]
+"""Of a candidate: its chunk, empty where a session has one invocation, and its number."""
 
-TABLE = "candidates.parquet"
+TABLE, REFUSED = "candidates.parquet", "refused.parquet"
 HELD_OUT = "held_out"
 
 
@@ -82,12 +86,18 @@ class Proposals:
     """
 
     def __init__(self, folder: Path, labels: Mapping[str, str]) -> None:
-        self._where = str(folder / TABLE)
-        self._rows: dict[int, dict[str, Any]] = {}
+        self._rows: dict[Key, dict[str, Any]] = {}
         self._touching: dict[int, tuple[str, ...]] = {}
-        if "fixture" not in labels or not (folder / TABLE).is_file():
+        self._shadow = "fixture" in labels
+        path = folder / TABLE if self._shadow else folder.parent / REFUSED
+        self._where = str(path)
+        if not path.is_file():
             return
-        self._rows = {int(row["candidate"]): row for row in _rows(folder / TABLE, labels)}
+        if not self._shadow:
+            rows = _refused(path, labels)
+            self._rows = {(row["chunk_id"], int(row["candidate"])): row for row in rows}
+            return
+        self._rows = {("", int(row["candidate"])): row for row in _rows(path, labels)}
         own = (labels.get("method"), labels.get("observation"))
         if labels["fixture"] == HELD_OUT and (folder / GALLERY.file).is_file():
             for example in GALLERY.read(folder).examples:
@@ -108,23 +118,24 @@ class Proposals:
         index, measures = int(candidate["index"]), candidate["measures"]
         layers = candidate["layers"]
         layer = next((name for name in LAYERS if layers.get(name) is not True), LAYERS[-1])
-        raw, projected = self._actions(index, measures)
+        row = self._rows.get(("" if self._shadow else candidate["chunk_id"], index))
+        raw, projected = self._actions(index, row, measures)
+        facts = measures if self._shadow or row is None else row
         return RejectedProposal(
             index=index,
             layer=layer,
             reason=str(candidate["first_reason"]),
-            row=measures.get("first_row"),
-            margin=measures.get("layer_margin"),
-            unit=measures.get("margin_unit", ""),
+            row=facts.get("first_row"),
+            margin=facts.get("layer_margin"),
+            unit=facts.get("margin_unit", ""),
             raw=raw,
             projected=projected,
-            touching=self._touching.get(index, ()),
+            touching=self._touching.get(index, ()) or tuple(facts.get("touching", ())),
         )
 
     def _actions(
-        self, index: int, measures: Mapping[str, Any]
+        self, index: int, row: Mapping[str, Any] | None, measures: Mapping[str, Any]
     ) -> tuple[Array | None, Array | None]:
-        row = self._rows.get(index)
         if row is None:
             return None, None
         for name in ("raw", "projected"):
@@ -134,7 +145,7 @@ class Proposals:
                     where=f"{self._where}: {name} of candidate {index}",
                     found="another one than the journal states",
                     expected=f"actions with sha256 {str(stated)[:16]}…",
-                    action="Table and journal are not of one run; run shadow again.",
+                    action="Table and journal are not of one run; run their stage again.",
                 )
         return _chunk(row["raw"]), _chunk(row["projected"])
 
@@ -143,6 +154,17 @@ def _chunk(numbers: Any) -> Array | None:
     """Actions (K, 10); None of what is no chunk."""
     found = np.array(numbers, dtype=np.float64)
     return found.reshape(-1, ACTION_DIM) if len(found) and len(found) % ACTION_DIM == 0 else None
+
+
+def _refused(path: Path, labels: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Rows of a rollout."""
+    table = read_columns(path, RefusedRow)
+    frame = table.select(["method", "perturbation", "start"]).to_pandas()
+    own = np.full(len(frame), True)
+    for name in frame:
+        own &= (frame[name].astype(str) == labels.get(name)).to_numpy()
+    found: list[dict[str, Any]] = table.filter(own).to_pylist()
+    return found
 
 
 def _rows(path: Path, labels: Mapping[str, str]) -> list[dict[str, Any]]:

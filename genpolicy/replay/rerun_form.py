@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from genpolicy.contract.latency import Term
 from genpolicy.errors import ConfigError
 from genpolicy.execution.nanoseconds import NS_PER_S
 from genpolicy.integrity.atomic import write_bytes
@@ -32,9 +33,14 @@ from genpolicy.verification.journal_source import readable
 
 CLOCK = "session"
 SOLIDS = ("cubes", "spheres", "cylinders")
-MEASURED = {"force": ("force_n", 1.0), "accept": ("age_ns", 1 / NS_PER_S)}
-"""Kinds of events with a number that is drawn over time: its field, and what it is multiplied by
-(force in N, age in s)."""
+MEASURED = {
+    "force": (("force_n", 1.0),),
+    "state": (("force_n", 1.0),),
+    "accept": (("age_ns", 1 / NS_PER_S),),
+    "latency": tuple((f"{term}_s", 1.0) for term in Term),
+}
+"""Kinds of events with numbers that are drawn over time: each field, and what it is multiplied by
+(force in N, times in s)."""
 
 
 def write_rerun(journal: Path, out: Path, *, session: str, task: str | None) -> dict[str, int]:
@@ -71,8 +77,7 @@ def write_rerun(journal: Path, out: Path, *, session: str, task: str | None) -> 
                 stream.log(place, shape)
             counts[item.topic] = counts.get(item.topic, 0) + 1
         for one in found.events:
-            if one.event.kind in MEASURED:
-                name, times = MEASURED[one.event.kind]
+            for name, times in MEASURED.get(one.event.kind, ()):
                 stream.set_time(CLOCK, duration=max(one.event.t, 0) / NS_PER_S)
                 place = f"/journal/{one.event.kind}/{name.rpartition('_')[0]}"
                 stream.log(place, rerun.Scalars(float(one.event.payload[name]) * times))
@@ -108,7 +113,7 @@ def _shapes(rerun: ModuleType, item: Drawn) -> Iterable[tuple[str, Any]]:
             yield from _entity(rerun, f"{item.topic}/{_safe(entity['id'])}", entity)
     elif item.schema == TRANSFORM_SCHEMA_NAME:
         yield (
-            item.topic,
+            f"{item.topic}/{content['child_frame_id']}",
             rerun.Transform3D(
                 translation=_xyz(content["translation"]),
                 quaternion=rerun.Quaternion(xyzw=_xyzw(content["rotation"])),

@@ -1,8 +1,8 @@
 """The events of a session as a viewer's messages: what stood, moved, was proposed and refused.
 
 Each topic says at every change all that it shows, once for a time, so that a viewer that jumps sees
-what one that played sees. The arm is drawn where it was commanded to be: a journal has joint
-positions of what was admitted, and measured ones only where a chunk was checked.
+what one that played sees. The arm is drawn where it was measured, which the journal of a
+rollout states at every tick; where a session has no such states, where it was commanded to be.
 """
 
 from collections import deque
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, split_action
+from genpolicy.contract.rotation import rotation_from_6d
 from genpolicy.data.recording.wire import LOG_SCHEMA_NAME
 from genpolicy.execution.journal import Event, decode_actions
 from genpolicy.execution.moment import FALLBACK
@@ -47,7 +48,7 @@ SCENE, ROBOT, COMMANDED, RAW, PROJECTED, REJECTED = (
 )
 TRANSFORMS, LOG = "/replay/tf", "/replay/log"
 JOINTS_COMMANDED, JOINTS_MEASURED = "/replay/joints/commanded", "/replay/joints/measured"
-COMMANDED_FRAME = "tcp_commanded"
+COMMANDED_FRAME, MEASURED_FRAME = "tcp_commanded", "tcp_measured"
 
 INK: Colour = (0.1, 0.1, 0.1, 1.0)
 BLUE: Colour = (0.0, 0.45, 0.70, 1.0)
@@ -77,7 +78,7 @@ class Timeline:
         self._cell, self._proposals, self._session = cell, proposals, session
         self._changed: dict[str, list[Json]] = {}
         self._logs: list[Json] = []
-        self._frame: tuple[Array, Array] | None = None
+        self._frames: dict[str, tuple[Array, Array]] = {}
         self._joints: dict[str, Array] = {}
         self._bodies: Any = None
         self._scene = cell.scene(SceneState())
@@ -87,7 +88,7 @@ class Timeline:
         self._path: deque[Array] = deque(maxlen=PATH_POINTS)
         self._at_m: Array | None = None
         self._holds = ""
-        self._posed = False
+        self._posed = self._measured = False
 
     def messages(self, events: Iterable[Event]) -> Iterator[Drawn]:
         """The messages of a session's events, in the order of time.
@@ -108,20 +109,22 @@ class Timeline:
     def _flushed(self, now_ns: int) -> Iterator[Drawn]:
         for topic, entities in self._changed.items():
             yield Drawn(topic, SCENE_SCHEMA_NAME, now_ns, scene_update(now_ns, entities))
-        if self._frame is not None:
-            content = transform(now_ns, COMMANDED_FRAME, *self._frame)
+        for frame, (position, rotation) in self._frames.items():
+            content = transform(now_ns, frame, position, rotation)
             yield Drawn(TRANSFORMS, TRANSFORM_SCHEMA_NAME, now_ns, content)
         for topic, q_rad in self._joints.items():
             yield Drawn(topic, JOINTS_SCHEMA_NAME, now_ns, joints(now_ns, q_rad))
         for content in self._logs:
             yield Drawn(LOG, LOG_SCHEMA_NAME, now_ns, content)
-        self._changed, self._logs, self._frame, self._joints = {}, [], None, {}
+        self._changed, self._logs, self._frames, self._joints = {}, [], {}, {}
 
     def _take(self, event: Event, now_ns: int) -> None:
         payload = event.payload
         match event.kind:
             case "scene":
                 self._show_scene(now_ns, payload["bodies"])
+            case "state":
+                self._measure(now_ns, payload)
             case "candidate":
                 self._judge(now_ns, payload)
             case "enqueue":
@@ -160,6 +163,13 @@ class Timeline:
         placed = self._cell.robot(q_rad, opening_m)
         self._changed[ROBOT] = self._entities(now_ns, placed)
 
+    def _measure(self, now_ns: int, payload: Mapping[str, Any]) -> None:
+        q_rad, turned = np.array(payload["q_rad"]), np.array(payload["tcp_rotation"])
+        self._measured = True
+        self._show_robot(now_ns, q_rad, float(payload["gripper_m"]))
+        self._joints[JOINTS_MEASURED] = q_rad
+        self._frames[MEASURED_FRAME] = (np.array(payload["tcp_m"]), rotation_from_6d(turned))
+
     def _entities(self, now_ns: int, placed: Sequence[Placed]) -> list[Json]:
         """An entity of each shape, so that a click says which it is."""
         return [
@@ -176,7 +186,7 @@ class Timeline:
         actions, motion = decode_actions(payload["actions"]), payload["motion"]
         q_rad = None if motion is None else _joints(motion, "q_rad")
         self._chunks[payload["arrival"]] = (payload, actions, q_rad)
-        if motion is not None:
+        if motion is not None and not self._measured:
             measured = _joints(motion, "q_meas_rad")[-1]
             self._joints[JOINTS_MEASURED] = measured
             if not self._posed:
@@ -198,9 +208,10 @@ class Timeline:
         if q_rad is not None:
             checked = row - int(chunk["checked_rows"][0])
             if 0 <= checked < len(q_rad):
-                self._show_robot(now_ns, q_rad[checked], float(opening))
+                if not self._measured:
+                    self._show_robot(now_ns, q_rad[checked], float(opening))
                 self._joints[JOINTS_COMMANDED] = q_rad[checked]
-        self._at_m, self._frame = position, (position, rotation)
+        self._at_m, self._frames[COMMANDED_FRAME] = position, (position, rotation)
         self._path.append(position)
         text = f"{payload['chunk_id']} row {row}, age {payload['age_ns'] / 1e6:.0f} ms"
         self._changed[COMMANDED] = [

@@ -63,7 +63,9 @@ class Measured:
             if m["t"] != self._last_ns:
                 yield "state.missing", f"No state is stated at {m['t']} ns."
         elif kind == "force":
-            self._peak_n, self._felt_ns = m["force_n"], m["t"]
+            self._peak_n, self._felt_ns = max(self._peak_n, m["force_n"]), m["t"]
+            if self._felt_ns == self._last_ns:
+                yield from self._felt(self._states[self._last_ns].force_n)
         elif kind == "enqueue" and m["motion"] is not None:
             yield from self._checked_from(m)
         elif kind == "conditioning":
@@ -79,14 +81,7 @@ class Measured:
         if not m["t"] > self._last_ns:
             yield "state.again", f"At {m['t']} ns more is stated than once a tick."
         self._states[m["t"]], self._last_ns = state, m["t"]
-        felt = self._felt_ns == m["t"]
-        if state.force_n > self._peak_n + ROUNDING or (
-            felt and not abs(state.force_n - self._peak_n) <= ROUNDING
-        ):
-            yield (
-                "state.force",
-                f"A force of {state.force_n} N is stated, and the peak is {self._peak_n} N.",
-            )
+        yield from self._felt(state.force_n)
         if self._forward is not None:
             position, rotation = self._forward(state.q_rad)
             off = max(
@@ -98,6 +93,12 @@ class Measured:
                     "state.pose",
                     f"The joints put the TCP elsewhere than is stated, by {off:.3g}.",
                 )
+
+    def _felt(self, force_n: float) -> Iterator[Finding]:
+        """No state is above the peak on record, and a new peak is the state of its tick."""
+        more_n = force_n - self._peak_n
+        if not (more_n <= ROUNDING and (self._felt_ns != self._last_ns or more_n >= -ROUNDING)):
+            yield "state.force", f"{force_n} N is stated, and the peak is {self._peak_n} N."
 
     def _checked_from(self, m: Message) -> Iterator[Finding]:
         motion = m["motion"]

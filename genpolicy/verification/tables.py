@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.refused import RefusedCandidates
 from genpolicy.verification.rollouts import order_statistic
 from genpolicy.verification.spliced import Spliced
 
@@ -118,13 +119,16 @@ class Condition:
 
 
 def derived_tables(
-    journals: Iterable[Path], spliced: Spliced | None = None
+    journals: Iterable[Path],
+    spliced: Spliced | None = None,
+    refused: RefusedCandidates | None = None,
 ) -> dict[str, list[dict[str, Any]]]:
     """Rows of the tables of `KEYS` that follow from journal files.
 
     Args:
         journals: The files.
         spliced: What takes the same events in beside, so that a journal is read once.
+        refused: Likewise.
 
     Returns:
         By table: its columns but the training seed. Times in s.
@@ -141,6 +145,8 @@ def derived_tables(
         for kind, message in read_messages(path):
             if spliced is not None:
                 spliced.read(kind, message)
+            if refused is not None:
+                refused.read(kind, message)
             name = str(message.get("session"))
             if kind == "session":
                 labels = message["labels"]

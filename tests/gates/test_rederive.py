@@ -4,7 +4,6 @@ import json
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
 from gates.rederive_disturbance import rederive_severities
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.latency import MEASURED_TERMS
+from genpolicy.contract.latency import MEASURED_TERMS, Term
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
 from genpolicy.evidence.documents import shadow, stress
 from genpolicy.evidence.rows.reproducibility import LatencyRow
@@ -35,6 +34,7 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.shadow.tables import checked
+from genpolicy.evidence.stress.measured import Measured
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
@@ -47,7 +47,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.seeds import stream
-from genpolicy.tasks.api import WorldSettings, load_task
+from genpolicy.tasks.api import World, WorldSettings, load_task
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.rollouts import derived_with_recoveries
@@ -63,6 +63,8 @@ LATENCY = [
     for term in MEASURED_TERMS
 ]
 SENSED_S, FIRST_S = 0.004, 0.031
+TERMS = {f"{term}_s": 0.002 if term in MEASURED_TERMS else 0.001 for term in Term}
+TERMS["sample_s"] += 0.015
 """Six declared terms, five measured ones, and the five of a cold call 3 ms longer each."""
 NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
 POWER = canonical_json(
@@ -79,12 +81,11 @@ TABLES = {
 
 
 @cache
-def _scene(start: int) -> dict[str, Any]:
-    """What a rollout of the plan sees first."""
+def _world(start: int) -> World:
+    """The world of a rollout of the plan."""
     task = load_task("tabletop_insertion")
     state = task.sample_start(stream(PARAMS["seed"], "starts", start))
-    world = task.make_world(state, settings=WorldSettings(task.calibration_epochs[-1]))
-    return task.scene_poses(world.observe())
+    return task.make_world(state, settings=WorldSettings(task.calibration_epochs[-1]))
 
 
 def _session(name: str, start: int, fault: str = "") -> Journal:
@@ -100,17 +101,21 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     supervisor = Supervisor(execution, journal)
     executor = Executor(cell, journal, ControllerStub(cell, journal, supervisor))
     executor.set_active(0.0, *maker(method))
-    journal.scene(0.0, _scene(start))
+    task, world = load_task("tabletop_insertion"), _world(start)
+    seen, measured = world.observe(), Measured(task, world, journal)
+    journal.scene(0.0, task.scene_poses(seen))
     executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
         now_s = tick * horizons.action_period_s
-        journal.exposure(now_s, np.zeros(24))
+        measured.note(now_s)
+        journal.exposure(now_s, seen)
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         executor.tick(now_s)
         journal.arrived(now_s + SENSED_S, exposed_s=now_s)
     executor.begin_invocation(0.2, "one", repr(FIRST_S))
+    journal.add("latency", journal.clock(0.2), {"id": "one", **TERMS})
     key = ["stress", perturbation, start, 1]
-    history = np.zeros((2, 24))
+    history = np.stack([seen, seen])
     journal.conditioning(0.2, invocation_id="one", exposed_s=now_s, key=key, history=history)
     if fault:
         journal.invocation(0.2, invocation_id="one", stage="fault", detail=fault)
@@ -121,6 +126,8 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
         recovery.feel(0.2, 1.5)
     for force_n in (3.0, 7.5, 2.0):
         journal.add("force", journal.clock(0.2), {"force_n": force_n})
+    told = journal.last("state")
+    journal.add("state", journal.clock(0.2), {**told, "force_n": 7.5})
     outcome = "collision" if start == 0 else "timeout"
     journal.add("outcome", journal.clock(0.2), {"outcome": outcome, "mode": "left"})
     executor.end_episode(0.2)

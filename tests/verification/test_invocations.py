@@ -6,6 +6,7 @@ import pytest
 
 from genpolicy.candidates.wire.faults import Fault
 from genpolicy.verification.invocations import FAULTS, Invocations
+from genpolicy.verification.terms import TERMS
 
 MS = 1_000_000
 SESSION = ("session", {"t": 0, "labels": {"start_sha256": "ab"}})
@@ -28,12 +29,20 @@ SEEN = [
 ]
 
 
+def terms_of(begun):
+    """Terms of an invocation whose observation was 1 ms on its way; it may take no number."""
+    seconds = begun["detail"].removesuffix("soon") or "0"
+    sampled = {"capture_s": 0.001, "sample_s": float(seconds) - 0.001}
+    return {"t": begun["t"], "id": begun["id"], **dict.fromkeys(TERMS, 0.0), **sampled}
+
+
 def rules(*events, session=SESSION):
     seen = Invocations()
     told = [session, *SEEN]
     for event in events:
         told.append(event)
         if event[1].get("stage") == "begin":
+            told.append(("latency", terms_of(event[1])))
             told.append(("conditioning", {**SAW, "id": event[1]["id"]}))
     return [rule for kind, message in told for rule, _ in seen.follow(kind, message)]
 

@@ -124,6 +124,44 @@ class SpliceRow:
 
 
 @dataclass(frozen=True)
+class RefusedRow:
+    """`refused.parquet` of stress: a candidate that a layer refused, of a rollout kept whole.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        perturbation: What was injected.
+        start: Number of the initial state.
+        chunk_id: Its name in the journal.
+        candidate: Its number among the candidates of its invocation.
+        layer: The layer that refused it.
+        first_reason: The check that it failed at.
+        first_row: First row of the chunk that offends against it, counted from 0; None where the
+            array is no chunk.
+        layer_margin: Margin of that layer; None where it is no number.
+        margin_unit: Its unit.
+        touching: Names of the two shapes that touch; empty where none do.
+        raw: Actions as proposed, row by row.
+        projected: Actions as projected, row by row.
+    """
+
+    method: str
+    seed: int
+    perturbation: str
+    start: int
+    chunk_id: str
+    candidate: int
+    layer: str
+    first_reason: str
+    first_row: int | None
+    layer_margin: float | None
+    margin_unit: str
+    touching: tuple[str, ...]
+    raw: tuple[float, ...]
+    projected: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class RecoveryRow:
     """`recoveries.parquet` of stress: one entry into recovery.
 

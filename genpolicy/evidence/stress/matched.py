@@ -19,6 +19,7 @@ from genpolicy.evidence.rows.stress import (
 )
 from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.recoveries import recovery_rows
+from genpolicy.evidence.stress.refused import refused_rows
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.shard import Shard, ShardResult
 from genpolicy.evidence.stress.shard_rows import (
@@ -103,6 +104,9 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         recoveries=[row for rows in recoveries for row in rows],
         overruns=overrun_rows(shard, rollouts),
         faults=fault_rows(shard, rollouts),
+        refused=refused_rows(
+            [row for row, _ in parts], [rollout.refused for rollout in rollouts], setup.checker
+        ),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
@@ -169,5 +173,5 @@ def _judge_deliveries(active: Sequence[Rollout]) -> None:
         results = checker.admit_many(
             [proposal for _, (proposal, _) in open_ones], [context for _, (_, context) in open_ones]
         )
-        for (rollout, _), result in zip(open_ones, results, strict=True):
-            rollout.settle(result)
+        for (rollout, (_, context)), result in zip(open_ones, results, strict=True):
+            rollout.settle(result, context)

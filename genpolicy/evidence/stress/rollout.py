@@ -18,8 +18,6 @@ from genpolicy.contract.chunk import (
     Candidate,
     DiscardReason,
     Proposal,
-    actions_sha256,
-    raw_actions,
 )
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import (
@@ -34,6 +32,7 @@ from genpolicy.evidence.stress.exposures import Exposure, Exposures, conditioned
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.joined import Joined
 from genpolicy.evidence.stress.measured import Measured
+from genpolicy.evidence.stress.refused import Refused, measures_of
 from genpolicy.evidence.stress.splices import Splice, splice_of
 from genpolicy.evidence.stress.state import InFlight, Outcome, Setup, Tally, in_flight
 from genpolicy.execution.attended import AttendedExecutor
@@ -89,6 +88,7 @@ class Rollout:
         self.outcome: Outcome | None = None
         self.tally = Tally()
         self.splices: list[Splice] = []
+        self.refused: list[Refused] = []
         self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
         shared = setup, self.executor, self.journal, self.tally
@@ -158,8 +158,8 @@ class Rollout:
         proposal = self._joined.propose(flying, drawn, late_rows=late)
         return proposal, self._delivery_context(late)
 
-    def settle(self, result: Admitted | Rejected) -> None:
-        """Take the verdict on `pending`: the first that passes all layers is taken."""
+    def settle(self, result: Admitted | Rejected, context: Context) -> None:
+        """Take the verdict on `pending`, in its context: the first that passes is taken."""
         flying = self._deliveries.take()
         verdict, now_s = result.verdict, self.now_s
         self._joined.record(flying, result.metadata.chunk_id, now_s)
@@ -170,7 +170,7 @@ class Rollout:
             index=flying.candidate,
             layers={layer.name: layer.passed for layer in verdict.layers},
             first_reason=verdict.first_reason or None,
-            measures={"drawn_sha256": actions_sha256(raw_actions(flying.drawn))},
+            measures=measures_of(flying, result),
         )
         if isinstance(result, Admitted):
             self.tally.refused.discard(flying.metadata.chunk_id)
@@ -181,6 +181,7 @@ class Rollout:
                 self.splices.append(splice_of(self.setup.checker, flying, result))
             return
         self.tally.refused.add(flying.metadata.chunk_id)
+        self.refused.append(Refused(flying.candidate, result, context))
         counts = self.tally.rejected_by
         counts[result.reason] = counts.get(result.reason, 0) + 1
         # What made one candidate late or void holds for all of its invocation. It is known where

@@ -15,6 +15,7 @@ from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
     RecoveryRow,
+    RefusedRow,
     RolloutRow,
     SpliceRow,
     StressStubRow,
@@ -93,6 +94,7 @@ class ShardResult:
         recoveries: One row per entry into recovery.
         overruns: One row per term that took longer than it may.
         faults: One row per kind in which the policy's process failed.
+        refused: One row per candidate that was refused, of the rollouts that are kept whole.
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
@@ -105,6 +107,7 @@ class ShardResult:
     recoveries: list[RecoveryRow]
     overruns: list[OverrunRow]
     faults: list[FaultRow]
+    refused: list[RefusedRow]
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow

@@ -23,6 +23,7 @@ from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
     RecoveryRow,
+    RefusedRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -67,6 +68,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "splices.parquet", SpliceRow, splices)
     recoveries = [row for _, result in pairs for row in result.recoveries]
     write_rows(folder / "recoveries.parquet", RecoveryRow, recoveries)
+    refused = [row for _, result in pairs for row in result.refused]
+    write_rows(folder / "refused.parquet", RefusedRow, refused)
     counts: list[StressCountRow] = []
     balances: list[ConservationRow] = []
     for shard, result in pairs:

@@ -402,6 +402,7 @@ def test_an_unsampled_invocation_is_a_fault_of_ours(make_fixture, kit, plans):
         for _ in range(4):
             rollout.sense()
             while (question := rollout.pending()) is not None:
-                rollout.settle(rollout.fixture.checker.admit(question[0], context=question[1]))
+                checker, (proposal, context) = rollout.fixture.checker, question
+                rollout.settle(checker.admit(proposal, context=context), context)
             rollout.decide()
             rollout.act()
