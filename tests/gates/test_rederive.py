@@ -27,6 +27,7 @@ from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
     RecoveryRow,
+    RefusedRow,
     RolloutRow,
     SeverityRow,
     SpliceRow,
@@ -162,6 +163,7 @@ def root(tmp_path):
         made = [TABLES[name](**row, **seed) for row in listed]
         write_rows(folder / f"{name}.parquet", TABLES[name], made)
     write_rows(folder / "splices.parquet", SpliceRow, [])  # nothing is delivered
+    write_rows(folder / "refused.parquet", RefusedRow, [])
     shadow.CHECKER.write(folder, checked(documents))
     (folder / "envelope.json").write_text(json.dumps(_envelope(folder)))
     (folder / "power.json").write_bytes(POWER)

@@ -62,7 +62,7 @@ def test_of_a_success_that_nobody_watches_nothing_is_kept(blocked):
     assert len(kept) == 2 * len(blocked.refused)
 
 
-def test_the_journal_alone_says_which_rows_there_are(blocked, tmp_path):
+def test_the_journal_alone_says_which_rows_there_are(blocked):
     found = RefusedCandidates()
     for event in blocked.journal.events():
         found.read(event.kind, {**event.payload, "session": event.session})
