@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from held import hold
 
 GOLDEN = Path(__file__).parent / "golden"
-OF_OTHERS = {"joined", "force", "push", "outcome", "person"}
-"""Written by those who vote, move the arm or end an episode, and where somebody has the arm."""
+OF_OTHERS = {"joined", "force", "push", "outcome", "person", "state", "latency"}
+"""Written by those who vote, measure or move the arm or end an episode, and where a person has it."""
 JOINTS = 7
 LONG = 200  # signs; what is longer is told by its hash
 
