@@ -23,7 +23,7 @@ from held import hold
 
 GOLDEN = Path(__file__).parent / "golden"
 OF_OTHERS = {"joined", "force", "push", "outcome", "person", "state", "latency"}
-"""Written by those who vote, measure or move the arm or end an episode, and where a person has it."""
+"""Written by those who vote, measure, move the arm or end an episode, and by who has the arm."""
 JOINTS = 7
 LONG = 200  # signs; what is longer is told by its hash
 
