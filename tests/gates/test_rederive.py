@@ -186,6 +186,16 @@ def test_true_evidence_stands(root):
     assert row["latency_p95_s"] == FIRST_S
 
 
+def test_a_term_that_was_not_drawn_is_refused_where_the_sum_is_the_same(root, monkeypatch):
+    for term, more_s in (("encode_s", 0.001), ("sample_s", -0.001)):
+        monkeypatch.setitem(TERMS, term, TERMS[term] + more_s)
+    path = root / STRESS / "journals" / "flow__nominal.mcap"
+    write_journal(path, [_session("flow__nominal", start) for start in (0, 1)])
+    assert check_journal(path).violations == []
+    with pytest.raises(RefusedError, match="encode of invocation 'one'"):
+        rederive(root, "D")
+
+
 FORGED = {
     "success": True, "outcome": "success", "force_peak_n": 1.0, "deadline_misses": 0,
     "interventions": 5, "latency_p95_s": 0.001, "start_sha256": "cd", "mode": "right",
