@@ -46,7 +46,8 @@ def _kept(rollouts: Iterable[Row]) -> set[Rollout]:
     found: set[Rollout] = set()
     for _, shard in groupby(sorted(rollouts, key=_rollout), lambda row: _rollout(row)[:2]):
         rows: Sequence[Row] = list(shard)
-        whole = kept_whole([SimpleNamespace(**row) for row in rows])
+        ended: list[Any] = [SimpleNamespace(**row) for row in rows]
+        whole = kept_whole(ended)
         found |= {_rollout(row) for row, kept in zip(rows, whole, strict=True) if kept}
     return found
 

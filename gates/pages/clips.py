@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -90,7 +91,8 @@ def _chosen(rows: pd.DataFrame) -> list[tuple[pd.Series, list[str]]]:
     flags(rows, "success")
     for name in ("duration_s", "force_peak_n"):
         numbers(rows, name)
-    found = worth_watching(list(rows.itertuples()))
+    ended: list[Any] = list(rows.itertuples())
+    found = worth_watching(ended)
     return [(rows.iloc[place], why) for place, why in found.items()]
 
 

@@ -33,7 +33,7 @@ from genpolicy.verification.journal_source import readable
 
 CLOCK = "session"
 SOLIDS = ("cubes", "spheres", "cylinders")
-MEASURED = {
+MEASURED: Mapping[str, tuple[tuple[str, float], ...]] = {
     "force": (("force_n", 1.0),),
     "state": (("force_n", 1.0),),
     "accept": (("age_ns", 1 / NS_PER_S),),

@@ -125,8 +125,9 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
-            for follower in (self.invocations, self.attended, self.measured):
-                self._flag_all(follower.follow(kind, m))
+            self._flag_all(self.invocations.follow(kind, m))
+            self._flag_all(self.attended.follow(kind, m))
+            self._flag_all(self.measured.follow(kind, m))
             self._follow(kind, m)
             self._flag_all(self.joined.follow(kind, m, self.world.void_before, self.settings))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
