@@ -12,6 +12,8 @@ from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import DISTILLED
+from genpolicy.evidence.rows.stress import RefusedRow, RolloutRow
+from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.shadow.rig import EXECUTION
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
@@ -31,10 +33,14 @@ from genpolicy.evidence.stress.tables import (
     write_stress,
 )
 from genpolicy.execution.cell import Cell
+from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.matched_training import PolicySettings, TrainingPlan, train_methods
 from genpolicy.policies.settings import NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.verification import tables
+from genpolicy.verification.journal_source import read_messages
+from genpolicy.verification.refused import KEYS as REFUSED_KEYS
+from genpolicy.verification.refused import RefusedCandidates
 from genpolicy.verification.rollouts import differences
 from genpolicy.verification.tables import KEYS, derived_tables
 from tests.candidates.conftest import entry_of  # noqa: F401
@@ -207,6 +213,25 @@ def test_every_table_follows_from_the_journals(written):
             assert differences(row, columns) == [], (name, row, columns)
             assert set(row) - set(columns) <= {"seed"}
     assert tables.AGE_LEVELS == AGE_LEVELS
+
+
+def test_what_layers_refused_of_failures_is_there_whole(written):
+    """Nobody succeeds in so short a time, so that everything is kept."""
+    told = RefusedCandidates()
+    for path in sorted((written / "journals").iterdir()):
+        for kind, m in read_messages(path):
+            told.read(kind, m)
+    rollouts = read_rows(written / "rollouts.parquet", RolloutRow)
+    assert not any(row.success for row in rollouts)
+    due = told.rows({(row.method, row.perturbation, row.start) for row in rollouts})
+    expected = {tuple(row[name] for name in REFUSED_KEYS): row["projected_sha256"] for row in due}
+    rows = read_rows(written / "refused.parquet", RefusedRow)
+    found = {
+        tuple(getattr(row, name) for name in REFUSED_KEYS): numbers_sha256(row.projected)
+        for row in rows
+    }
+    assert found == expected != {}
+    assert len(found) == len(rows)
 
 
 def test_the_checker_has_read_every_journal(written):
