@@ -96,6 +96,7 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         rollout.end(Outcome.TIMEOUT)
     write_journal(shard.journal, [rollout.journal for rollout in rollouts])
     recoveries = [recovery_rows(shard, rollout) for rollout in rollouts]
+    refused = [rollout.refused for rollout in rollouts]
     parts = [rollout_row(shard, *each) for each in zip(rollouts, recoveries, strict=True)]
     return ShardResult(
         rollouts=[row for row, _ in parts],
@@ -104,9 +105,7 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         recoveries=[row for rows in recoveries for row in rows],
         overruns=overrun_rows(shard, rollouts),
         faults=fault_rows(shard, rollouts),
-        refused=refused_rows(
-            [row for row, _ in parts], [rollout.refused for rollout in rollouts], setup.checker
-        ),
+        refused=refused_rows([row for row, _ in parts], refused, setup.checker),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
