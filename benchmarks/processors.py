@@ -78,7 +78,7 @@ def trained(folder: Path, dataset: Path, *, updates: int, seed: int) -> tuple[st
     request = TrainingRequest(
         method=own.method, horizons=own.horizons, normalisation=checkpoint.normalisation,
         network=own.network, head=own.head,
-        training=TrainingConfig(**{**own.training.model_dump(), "steps": updates}),
+        training=TrainingConfig(**{**own.training.model_dump(), "updates": updates}),
         sampler=own.sampler, provenance=own.provenance, seed=seed,
     )  # fmt: skip
     windows, held_out = (
