@@ -1,4 +1,4 @@
-"""Writing reports: judge, render, and put the JSON there last.
+"""Writing reports: judge, print page, summary and rows, and put the JSON there last.
 
 The old JSON is removed first, so that a crash in between leaves no verdict rather than an old
 one. `python -m gates.writing` prints the ladder's first page once more.
@@ -8,20 +8,21 @@ import contextlib
 from pathlib import Path
 
 from gates.overriders import require_written
-from gates.pages.page import gate_page, index_page
-from gates.pages.summary import markdown
+from gates.pages.page import index_page
+from gates.pages.printing import differing, printed_beside
+from gates.pages.rows import rows_folder
 from gates.pipeline import LOCK, stages_of
 from gates.proof import judge
 from gates.report import GATES, Gate, GateReport, read_report, report_bytes, report_path, stage_of
 from genpolicy.errors import BadInputError
-from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.atomic import output_folder, write_bytes
 
 INDEX = "reports/index.html"
 """The ladder's first page, which a reader opens first."""
 
 
 def write_gate(root: Path, gate: Gate) -> GateReport:
-    """Judge a gate and write its report: HTML, Markdown, then JSON.
+    """Judge a gate and write its report: rows, Markdown, HTML, then JSON.
 
     A FAIL is a result like any other and raises nothing.
 
@@ -35,8 +36,12 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
     write_index(root)
     require_written(root)
     report = judge(root, gate)
-    write_bytes(base.with_suffix(".html"), gate_page(root, report).encode())
-    write_bytes(base.with_suffix(".md"), markdown(report).encode())
+    printed = printed_beside(root, report)
+    with output_folder(root / rows_folder(gate)) as folder:
+        for name in [name for name in printed if name.startswith(f"{rows_folder(gate)}/")]:
+            write_bytes(folder / Path(name).name, printed.pop(name))
+    for name, data in printed.items():
+        write_bytes(root / name, data)
     write_bytes(base, report_bytes(report))
     write_index(root)
     return report
@@ -50,10 +55,10 @@ def write_index(root: Path) -> Path:
 
 
 def changed_page(root: Path) -> str:
-    """The first printed page that is another one than the reports give; empty if none is.
+    """The first printed page or file of rows that is another one than the reports give.
 
-    The first page has no record, since every gate prints it again, and neither have those of a
-    gate whose entry was taken out of `dvc.lock`: these are printed once more and compared. All
+    Empty if none is. The first page has no record, since every gate prints it again, and neither
+    have those of a gate whose entry was taken out of `dvc.lock`: these are printed once more and compared. All
     others are held against the recorded run where the report is proved.
 
     Raises:
@@ -67,16 +72,10 @@ def changed_page(root: Path) -> str:
         if not base.is_file():
             continue
         run = stages_of(root, LOCK).get(stage_of(gate)) or {}
-        recorded = {str(entry.get("path")) for entry in run.get("outs") or ()}
-        for suffix in (".md", ".html"):
-            page = base.with_suffix(suffix)
-            name = page.relative_to(root).as_posix()
-            if not page.is_file() or name in recorded:
-                continue
-            report, _ = read_report(root, gate)
-            again = markdown(report) if suffix == ".md" else gate_page(root, report)
-            if page.read_bytes() != again.encode():
-                return name
+        recorded = frozenset(str(entry.get("path")) for entry in run.get("outs") or ())
+        report, _ = read_report(root, gate)
+        if name := differing(root, report, recorded=recorded, whole=False):
+            return name
     return ""
 
 

@@ -20,8 +20,7 @@ from gates.package.bundling import (
 from gates.package.contents import brought
 from gates.package.index import BundleIndex
 from gates.package.statements import statement_path
-from gates.pages.page import gate_page
-from gates.pages.summary import markdown
+from gates.pages.printing import differing
 from gates.pipeline import CODE, TASK
 from gates.proof import Rung
 from gates.report import read_report, report_path
@@ -178,15 +177,11 @@ def _require_environment(folder: Path) -> None:
 
 
 def _require_pages(folder: Path) -> None:
-    """Pages that people read say what the reports say: each is printed once more."""
+    """Pages and rows that people read say what the reports say: each is printed once more."""
     for gate in BUNDLED:
         report, _ = read_report(folder, gate)
-        base = folder / report_path(gate)
-        printed = {".md": markdown(report), ".html": gate_page(folder, report)}
-        for suffix, again in printed.items():
-            page = base.with_suffix(suffix)
-            if not page.is_file() or page.read_bytes() != again.encode():
-                raise _untrue(page.relative_to(folder).as_posix(), "another page")
+        if name := differing(folder, report):
+            raise _untrue(name, "another page")
 
 
 def _untrue(where: str, found: str) -> IntegrityError:

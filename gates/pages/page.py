@@ -47,14 +47,18 @@ from gates.pages.clips import clips_of
 from gates.pages.desk import desk_of
 from gates.pages.desk_card import card_of, papers_of, signing_of
 from gates.pages.desk_costs import HEADS, costs_of
+from gates.pages.desk_end import end_of
 from gates.pages.desk_gain import gain_of
+from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.numbers import human, judged_at, limit_said, rests_on
+from gates.pages.rows import CRITERIA, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
+from gates.stress.rollouts import ROLLOUTS
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCard
 from genpolicy.integrity.hashing import sha256_bytes
@@ -132,6 +136,8 @@ def gate_page(root: Path, report: GateReport) -> str:
         card=card,
         card_state=state,
         overridden=[said(entry) for entry in report.overrides],
+        rows=rows_of(root, report),
+        rows_of_criteria=CRITERIA,
         digest=sha256_bytes(report_bytes(report)),
     )
 
@@ -192,10 +198,12 @@ def index_page(root: Path) -> str:
     reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
     evidence = Evidence(root)
     papers = papers_of(reports, evidence)
+    signing = signing_of(reports, evidence, papers)
+    rows_by_gate = {gate: rows_of(root, report) for gate, report in reports.items()}
     return _render(
         "index.html",
         current="",
-        rows=rows,
+        ladder=rows,
         desk=desk_of(reports),
         overridden=list(dict.fromkeys(said(e) for r in reports.values() for e in r.overrides)),
         line=line_of(reports, evidence, card_of(papers)),
@@ -203,7 +211,12 @@ def index_page(root: Path) -> str:
         clips=clips_of(reports, evidence),
         heads=HEADS,
         costs=costs_of(reports, evidence),
-        signing=signing_of(reports, evidence, papers),
+        rows=rows_by_gate,
+        rows_of_criteria=CRITERIA,
+        rollouts=rows_by_gate["D"].by_method(ROLLOUTS) if "D" in reports else {},
+        exhibits=exhibits_of(reports, evidence, signing),
+        signing=signing,
+        end=end_of(reports),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-GLOSSARY = ROOT / "docs" / "glossary.md"
+GLOSSARY = ROOT / "gates" / "pages" / "glossary.md"
 PRODUCT = ("genpolicy", "gates", "stages", "flows")
 MOST_LINES = 40
 # Words of the design that the glossary must explain.

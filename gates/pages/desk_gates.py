@@ -1,0 +1,173 @@
+"""The evidence on the desk: one figure and one table a gate; the rest stands on its page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags
+from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, PASSED
+from gates.need.settings import AUDIT
+from gates.pages import plots_feasibility, plots_need, plots_stress, plots_time
+from gates.pages.bound import require_bound
+from gates.pages.desk_card import Signing
+from gates.pages.desk_costs import share
+from gates.pages.figures import Listing, Picturable, Shown, Table, draw_all, in_order
+from gates.pages.plots_time import TEMPERATURES
+from gates.pages.rows import RowsFile, rows_of
+from gates.report import GATES, NAMES, Gate, GateReport, parse_report, report_bytes
+from gates.reproducibility.latency_budget import LATENCY, MILLI, budget_of
+from gates.stress.rollouts import ROLLOUTS
+from genpolicy.audit.rows import ModeOutcome
+from genpolicy.errors import GenpolicyError
+from genpolicy.evidence.rows.reproducibility import LatencyRow
+from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.rows.stress import RolloutRow
+
+MODES = f"{AUDIT}/modes.parquet"
+KEPT = 8
+"""The desk is printed again by every gate; the same evidence is drawn once in a process."""
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """What the desk shows of one gate's evidence.
+
+    Attributes:
+        gate: Its letter.
+        name: Its name.
+        figure: The figure; None for a gate that has none.
+        table: The table, or why it is not shown.
+        rows: Files of rows that both are made of.
+        missing: Why nothing is shown; empty if something is.
+    """
+
+    gate: Gate
+    name: str
+    figure: Shown | None = None
+    table: Shown | None = None
+    rows: tuple[RowsFile, ...] = ()
+    missing: str = ""
+
+
+def exhibits_of(
+    reports: Mapping[Gate, GateReport], evidence: Evidence, signing: Signing
+) -> tuple[Exhibit, ...]:
+    """The evidence of every gate, from what its report names."""
+    return tuple(_exhibit(gate, reports.get(gate), evidence, signing) for gate in GATES)
+
+
+def _exhibit(
+    gate: Gate, report: GateReport | None, evidence: Evidence, signing: Signing
+) -> Exhibit:
+    if report is None:
+        return Exhibit(gate, NAMES[gate], missing="not judged")
+    if gate == "E":
+        return _signatures(signing)
+    sources = dict.fromkeys(path for item in SHOWN[gate] for path in (item.source, *item.also))
+    try:
+        for path in sources:
+            require_bound(evidence, report, path)
+    except (MissingEvidenceError, GenpolicyError) as error:
+        return Exhibit(gate, NAMES[gate], missing=" ".join(str(error).split())[:200])
+    figure, table = _drawn(evidence.root, gate, report_bytes(report))
+    own = tuple(file for file in rows_of(evidence.root, report).files if file.path in sources)
+    return Exhibit(gate, NAMES[gate], figure, table, own)
+
+
+@lru_cache(maxsize=KEPT)
+def _drawn(root: Path, gate: Gate, report: bytes) -> tuple[Shown, ...]:
+    """Figure and table of the evidence that a report names."""
+    return tuple(draw_all(SHOWN[gate], Evidence(root), parse_report(report, gate=gate)))
+
+
+def _signatures(signing: Signing) -> Exhibit:
+    if signing.missing:
+        return Exhibit("E", NAMES["E"], missing=signing.missing)
+    lines = [
+        *((person, "has signed") for person in signing.signed),
+        *((role, "has not signed") for role in signing.lacking),
+    ]
+    table = Shown("Who has to sign", "", (), listed=(("who", "signature"), *lines))
+    return Exhibit("E", NAMES["E"], table=table)
+
+
+def _named(plots: Sequence[Picturable], title: str) -> Picturable:
+    """A figure of a gate's page by its title."""
+    return next(plot for plot in plots if plot.title == title)
+
+
+def _modes(evidence: Evidence, report: GateReport) -> Table:
+    """Of each mode how many of its episodes succeed, and how many of its chunks are feasible."""
+    frame = evidence.rows(MODES, ModeOutcome).sort_values(["phase", "mode"])
+    columns = ("successes", "episodes", "admissible", "checked")
+    lines = [
+        (str(mode), str(phase), _share(won, of), _share(passed, checked))
+        for mode, phase, won, of, passed, checked in zip(
+            frame["mode"], frame["phase"], *(counts(frame, name) for name in columns), strict=True
+        )
+    ]
+    return ("mode", "phase", "episodes that succeed", "chunks that pass all six layers"), *lines
+
+
+def _ends(evidence: Evidence, report: GateReport) -> Table:
+    """Warm and cold latency of each method, end to end; the terms stand on the gate's page."""
+    frame, confidence = evidence.rows(LATENCY, LatencyRow), float(report.settings["confidence"])
+    lines = []
+    for method in in_order(frame["method"]):
+        own = frame[frame["method"] == method]
+        ends = [budget_of(own, name, confidence=confidence).end_to_end for name in TEMPERATURES]
+        cells = [f"{MILLI * value:.3g} ms" for end in ends for value in (end.p50[0], end.p95[0])]
+        lines.append((method, *cells))
+    return ("method", *(f"{t} {q}" for t in TEMPERATURES for q in ("p50", "p95"))), *lines
+
+
+def _layers(evidence: Evidence, report: GateReport) -> Table:
+    """Of each method what passes all six layers, of intact and of corrupted observations."""
+    frame = evidence.rows(CANDIDATES, CandidateRow)
+    lines = []
+    for method in in_order(frame["method"]):
+        rows = frame[frame["method"] == method]
+        held, corrupted = rows[rows["fixture"] == HELD_OUT], rows[~rows["fixture"].isin(INTACT)]
+        cells = [_share((own["outcome"] == PASSED).sum(), len(own)) for own in (held, corrupted)]
+        lines.append((method, *cells))
+    return ("method", "held-out chunks that pass", "corrupted chunks that pass"), *lines
+
+
+def _successes(evidence: Evidence, report: GateReport) -> Table:
+    """Success of each method in each judged condition, and in all together."""
+    frame = evidence.rows(ROLLOUTS, RolloutRow)
+    planned = [str(name) for name in report.settings["perturbations"]]
+    frame = frame[frame["perturbation"].isin(planned)]
+    lines = []
+    for method in in_order(frame["method"]):
+        own = frame[frame["method"] == method]
+        parts = [own, *(own[own["perturbation"] == name] for name in planned)]
+        lines.append((method, *(_share(flags(rows, "success").sum(), len(rows)) for rows in parts)))
+    return ("method", "all", *(name.replace("_", " ") for name in planned)), *lines
+
+
+def _share(hits: float, of: float) -> str:
+    cell = share(hits, of)
+    return f"{cell.value}, {cell.of}" if cell.of else cell.value
+
+
+SHOWN: dict[Gate, tuple[Picturable, Picturable]] = {
+    "A": (
+        _named(plots_need.PLOTS, "Modes and their mean, in the scene plane"),
+        Listing("Success of each mode", "", MODES, _modes),
+    ),
+    "B": (
+        _named(plots_time.PLOTS, "Where the time goes"),
+        Listing("From sensor to answer, end to end", "", LATENCY, _ends),
+    ),
+    "C": (
+        _named(plots_feasibility.PLOTS, "Rejection waterfall"),
+        Listing("What passes all six layers", "", CANDIDATES, _layers),
+    ),
+    "D": (
+        _named(plots_stress.PLOTS, "Success, by condition and method"),
+        Listing("Success, by condition and method", "", ROLLOUTS, _successes),
+    ),
+}
+"""Figure and table of each gate with measured evidence."""
