@@ -58,8 +58,8 @@ def changed_page(root: Path) -> str:
     """The first printed page or file of rows that is another one than the reports give.
 
     Empty if none is. The first page has no record, since every gate prints it again, and neither
-    have those of a gate whose entry was taken out of `dvc.lock`: these are printed once more and compared. All
-    others are held against the recorded run where the report is proved.
+    have those of a gate whose entry was taken out of `dvc.lock`: these are printed once more and
+    compared. All others are held against the recorded run where the report is proved.
 
     Raises:
         GenpolicyError: A report or its evidence cannot be read.

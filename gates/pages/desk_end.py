@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import Any
 
 from gates.pages.figures import Table
+from gates.pages.guide import label
 from gates.report import GATES, Gate, GateReport, report_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
@@ -77,7 +78,7 @@ def _settings(report: GateReport) -> Iterator[tuple[str, ...]]:
     for name, value in sorted(report.settings.items()):
         members = value if isinstance(value, list) else [value]
         if members and not any(isinstance(member, dict | list) for member in members):
-            yield report.gate, name.replace("_", " "), ", ".join(map(_said, members))
+            yield report.gate, label(name), ", ".join(map(_said, members))
 
 
 def _said(value: Any) -> str:

@@ -25,6 +25,8 @@ from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.rows.stress import RolloutRow
 
 MODES = f"{AUDIT}/modes.parquet"
+UNBROKEN = "\u00a0"
+"""A space at which no line ends, so that a share and its counts stay readable in a narrow cell."""
 KEPT = 8
 """The desk is printed again by every gate; the same evidence is drawn once in a process."""
 
@@ -107,19 +109,19 @@ def _modes(evidence: Evidence, report: GateReport) -> Table:
             frame["mode"], frame["phase"], *(counts(frame, name) for name in columns), strict=True
         )
     ]
-    return ("mode", "phase", "episodes that succeed", "chunks that pass all six layers"), *lines
+    return ("mode", "phase", "episodes", "chunks"), *lines
 
 
 def _ends(evidence: Evidence, report: GateReport) -> Table:
-    """Warm and cold latency of each method, end to end; the terms stand on the gate's page."""
+    """Warm and cold latency of each candidate, end to end; the terms stand on the gate's page."""
     frame, confidence = evidence.rows(LATENCY, LatencyRow), float(report.settings["confidence"])
     lines = []
-    for method in in_order(frame["method"]):
+    for method in in_order(report.candidates):
         own = frame[frame["method"] == method]
         ends = [budget_of(own, name, confidence=confidence).end_to_end for name in TEMPERATURES]
         cells = [f"{MILLI * value:.3g} ms" for end in ends for value in (end.p50[0], end.p95[0])]
         lines.append((method, *cells))
-    return ("method", *(f"{t} {q}" for t in TEMPERATURES for q in ("p50", "p95"))), *lines
+    return ("candidate", *(f"{t} {q}" for t in TEMPERATURES for q in ("p50", "p95"))), *lines
 
 
 def _layers(evidence: Evidence, report: GateReport) -> Table:
@@ -131,7 +133,7 @@ def _layers(evidence: Evidence, report: GateReport) -> Table:
         held, corrupted = rows[rows["fixture"] == HELD_OUT], rows[~rows["fixture"].isin(INTACT)]
         cells = [_share((own["outcome"] == PASSED).sum(), len(own)) for own in (held, corrupted)]
         lines.append((method, *cells))
-    return ("method", "held-out chunks that pass", "corrupted chunks that pass"), *lines
+    return ("method", "held out", "corrupted"), *lines
 
 
 def _successes(evidence: Evidence, report: GateReport) -> Table:
@@ -149,13 +151,14 @@ def _successes(evidence: Evidence, report: GateReport) -> Table:
 
 def _share(hits: float, of: float) -> str:
     cell = share(hits, of)
-    return f"{cell.value}, {cell.of}" if cell.of else cell.value
+    parts = [cell.value, *([cell.of] if cell.of else [])]
+    return ", ".join(part.replace(" ", UNBROKEN) for part in parts)
 
 
 SHOWN: dict[Gate, tuple[Picturable, Picturable]] = {
     "A": (
         _named(plots_need.PLOTS, "Modes and their mean, in the scene plane"),
-        Listing("Success of each mode", "", MODES, _modes),
+        Listing("Episodes that succeed, and chunks that pass all six layers", "", MODES, _modes),
     ),
     "B": (
         _named(plots_time.PLOTS, "Where the time goes"),
@@ -163,10 +166,10 @@ SHOWN: dict[Gate, tuple[Picturable, Picturable]] = {
     ),
     "C": (
         _named(plots_feasibility.PLOTS, "Rejection waterfall"),
-        Listing("What passes all six layers", "", CANDIDATES, _layers),
+        Listing("Chunks that pass all six layers", "", CANDIDATES, _layers),
     ),
     "D": (
-        _named(plots_stress.PLOTS, "Success, by condition and method"),
+        _named(plots_stress.PLOTS, "How rollouts end"),
         Listing("Success, by condition and method", "", ROLLOUTS, _successes),
     ),
 }

@@ -10,7 +10,7 @@ import csv
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from gates.report import Answer, GateReport, report_path
-from gates.stress.rollouts import STRESS
+from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_bytes_of, sha256_file
@@ -36,6 +36,8 @@ KEPT_TABLES = 48
 """Every page is printed several times in a process; the same bytes are written out once."""
 CRITERIA = "criteria.csv"
 ARTIFACTS = "artifacts/"
+COMPARED = (ROLLOUTS,)
+"""Tables in which a candidate is held against others, so that rows of all methods count."""
 ROLLOUT = ("method", "perturbation", "start")
 """What names a rollout, in the order of its name."""
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -64,7 +66,7 @@ class RowsFile:
     name: str
     kept: int
     of: int
-    data: bytes
+    data: bytes = field(repr=False)
 
     @property
     def said(self) -> str:
@@ -127,7 +129,8 @@ def rows_of(root: Path, report: GateReport) -> Rows:
     for path, whose in sorted(asked.items()):
         if path.startswith(ARTIFACTS) and path.endswith((".parquet", ".json")):
             # What is asked of the gate may compare all methods; of a candidate, its own is asked.
-            only = frozenset() if None in whose else frozenset(filter(None, whose))
+            compares = None in whose or path in COMPARED
+            only = frozenset[str]() if compares else frozenset(filter(None, whose))
             found += _files(root / path, path, report.materials.get(path, ""), played, only)
     return Rows(PurePosixPath(rows_folder(report.gate)).name, tuple(found))
 

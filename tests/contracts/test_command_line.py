@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from metadata import ROOT, project, write_metadata
 
+from gates.pages.desk_end import COMMANDS
 from genpolicy.cli.main import main
 from genpolicy.cli.shell import GROUP, loaded
 
@@ -76,6 +77,15 @@ def test_the_help_of_every_command_fits_80_columns_and_shows_an_example(words, c
         assert "..." not in text.partition("Commands:")[2], "a first sentence is too long"
     else:
         assert f"genpolicy {words[0]}" in text.partition("Examples:")[2]
+
+
+def test_the_commands_that_the_desk_names_exist() -> None:
+    known = every_command()
+    for command, _ in COMMANDS:
+        program, *words = command.split()
+        of_a_group = any(len(name) > 1 and name[0] == words[0] for name in known)
+        assert program == "genpolicy"
+        assert tuple(words[: 2 if of_a_group else 1]) in known, command
 
 
 def test_the_program_lists_every_command_and_no_name_twice(capsys) -> None:

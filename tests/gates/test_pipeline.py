@@ -350,6 +350,23 @@ def test_every_printed_page_is_held_to_its_record_and_nothing_else_is(ladder):
     assert pipeline.changed_pages(ladder, "A") == "reports/gate_a.md"
 
 
+def test_rows_beside_a_page_are_held_to_their_record(ladder):
+    """A folder: another byte, a file more and a file less are each another folder."""
+    rows = ladder / "reports/gate_a"
+    rows.mkdir()
+    (rows / "criteria.csv").write_text("criterion\n")
+    outs = [{"path": "reports/gate_a", "md5": pipeline.Disk(ladder, {}).md5("reports/gate_a")}]
+    _lock(ladder, lambda stages: stages.update(gate_a={"outs": outs}))
+    assert pipeline.changed_pages(ladder, "A") == ""
+    (rows / "more.csv").write_text("row\n")
+    assert pipeline.changed_pages(ladder, "A") == "reports/gate_a"
+    (rows / "more.csv").unlink()
+    (rows / "criteria.csv").write_text("criterion,candidate\n")
+    assert pipeline.changed_pages(ladder, "A") == "reports/gate_a"
+    (rows / "criteria.csv").unlink()
+    assert pipeline.changed_pages(ladder, "A") == "reports/gate_a"
+
+
 @pytest.mark.parametrize(
     ("recorded", "now", "same"),
     [

@@ -148,6 +148,7 @@ def test_a_bundle_is_proved_from_its_bytes_alone(
         (other_bytes("artifacts/stress/rollouts.parquet", flipped), "Gate D refuses"),
         (other_bytes("artifacts/ingest/frames.parquet", flipped), "Gate A refuses"),
         (other_bytes("reports/gate_d.html", better), "Gate D refuses"),
+        (other_bytes("reports/gate_d/criteria.csv", better), "Gate D refuses"),
         (page_and_record, r"reports/gate_d\.md is another page"),
         (other_bytes("genpolicy/seeds.py", lambda data: data + b"\n"), "other code than runs here"),
         (another_statement, r"statements/gate_d\.json is not what"),

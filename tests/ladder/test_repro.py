@@ -30,6 +30,7 @@ def test_the_ladder_runs_through_all_five_gates_and_waits_for_a_person(finished:
     for gate in GATES:
         for suffix in ("json", "md", "html", "metrics.json"):
             assert (finished / "reports" / f"{gate}.{suffix}").stat().st_size > 200
+        assert (finished / "reports" / gate / "criteria.csv").stat().st_size > 200
         names = {path.name for path in (finished / "artifacts" / gate).iterdir()}
         assert names == {"verdict.json", "criteria.csv"}
     assert not list((finished / "artifacts").glob(".*"))
@@ -56,6 +57,7 @@ def test_judging_one_gate_again_changes_its_report_only(copy: Path) -> None:
     assert changed <= {
         "reports/gate_c.json", "reports/gate_c.md", "reports/gate_c.html", "reports/index.html",
         "reports/gate_c.metrics.json", "artifacts/gate_c/criteria.csv",
+        "reports/gate_c/criteria.csv",
     }  # fmt: skip
     assert "reports/gate_c.json" in changed
     print(f"re-judging one gate: {outcome.duration_s:.2f} s")

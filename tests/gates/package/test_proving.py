@@ -9,7 +9,6 @@ from gates.package import proving
 from gates.package.archive import read_index
 from gates.package.bundling import package
 from gates.package.proving import prove_bundle
-from gates.report import report_path
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 
 
@@ -90,17 +89,16 @@ def test_other_libraries_are_told_with_what_to_install(whole, monkeypatch):
 
 
 def test_a_page_that_says_other_than_its_report_is_refused(whole, monkeypatch):
-    monkeypatch.setattr(proving, "gate_page", lambda root, report: "page")
-    monkeypatch.setattr(proving, "markdown", lambda report: "text")
-    for gate in "ABCD":
-        (whole / report_path(gate)).with_suffix(".html").write_text("page")
-        (whole / report_path(gate)).with_suffix(".md").write_text("text")
+    """So are rows; that each is printed once more and compared is tested where that is done."""
+    asked = []
+    monkeypatch.setattr(proving, "differing", lambda root, report: asked.append(report.gate) or "")
     proving._require_pages(whole)
-    (whole / report_path("C")).with_suffix(".md").write_text("better")
-    with pytest.raises(IntegrityError, match=r"gate_c\.md is another page"):
-        proving._require_pages(whole)
-    (whole / report_path("C")).with_suffix(".md").unlink()
-    with pytest.raises(IntegrityError, match=r"gate_c\.md is another page"):
+    assert asked == list("ABCD")
+    rows = "reports/gate_c/shadow.stub.flow.csv"
+    monkeypatch.setattr(
+        proving, "differing", lambda root, report: rows if report.gate == "C" else ""
+    )
+    with pytest.raises(IntegrityError, match=r"gate_c/shadow\.stub\.flow\.csv is another page"):
         proving._require_pages(whole)
 
 

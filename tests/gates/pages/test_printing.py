@@ -1,0 +1,83 @@
+"""What is printed beside a report: whole, the same again, and any other byte is named."""
+
+import shutil
+
+import pytest
+
+from gates.pages.printing import differing, printed_beside
+from gates.report import report_path
+from gates.writing import changed_page, write_gate
+
+ROWS = "reports/gate_d/stress.rollouts.flow.csv"
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory, whole):
+    root = tmp_path_factory.mktemp("printed") / "repo"
+    shutil.copytree(whole, root)
+    return root, write_gate(root, "D")
+
+
+@pytest.fixture
+def again(printed, tmp_path):
+    root, report = printed
+    shutil.copytree(root, tmp_path / "repo")
+    return tmp_path / "repo", report
+
+
+def test_all_of_it_lies_there_and_nothing_else(printed):
+    root, report = printed
+    expected = printed_beside(root, report)
+    assert {name: (root / name).read_bytes() for name in expected} == expected
+    lying = {path.relative_to(root).as_posix() for path in (root / "reports").rglob("*.*")}
+    assert lying == {*expected, report_path("D"), "reports/index.html"}
+    assert ROWS in expected and "reports/gate_d/criteria.csv" in expected
+    assert differing(root, report) == changed_page(root) == ""
+
+
+def test_a_folder_of_an_earlier_run_leaves_nothing_behind(again):
+    root, _ = again
+    (root / "reports/gate_d/old.csv").write_text("row\n")
+    write_gate(root, "D")
+    assert not (root / "reports/gate_d/old.csv").exists()
+
+
+def _other_number(path):
+    path.write_bytes(path.read_bytes().replace(b"true", b"frue", 1))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [_other_number, lambda path: path.unlink(), lambda path: path.write_bytes(b"")],
+    ids=["a cell", "missing", "empty"],
+)
+def test_another_file_of_rows_is_named(again, change):
+    root, report = again
+    change(root / ROWS)
+    assert differing(root, report) == changed_page(root) == ROWS
+
+
+def test_a_file_of_rows_that_no_report_gives_is_named(again):
+    root, report = again
+    (root / "reports/gate_d/more.csv").write_text("row\n")
+    assert differing(root, report) == changed_page(root) == "reports/gate_d/more.csv"
+
+
+def test_what_was_never_printed_counts_in_a_bundle_only(again):
+    root, report = again
+    shutil.rmtree(root / "reports/gate_d")
+    assert changed_page(root) == "" and differing(root, report) == "reports/gate_d/criteria.csv"
+    (root / "reports/gate_d.md").unlink()
+    assert changed_page(root) == "" and differing(root, report) == "reports/gate_d.md"
+
+
+def test_what_a_record_holds_is_left_to_it(again):
+    root, report = again
+    _other_number(root / ROWS)
+    folder = frozenset({"reports/gate_d"})
+    assert differing(root, report, recorded=folder) == ""
+    (root / "reports/gate_d.md").write_text("other")
+    assert differing(root, report, recorded=folder) == "reports/gate_d.md"
+    pages = {"reports/gate_d.md", "reports/gate_d.html"}
+    assert differing(root, report, recorded=folder | pages) == ""
+    assert differing(root, report, recorded=frozenset(pages)) == ROWS

@@ -1,0 +1,163 @@
+"""Rows under a number: those of the evidence, none of other bytes, bounded, and never run."""
+
+import csv
+import io
+import json
+
+import evidence
+import numpy as np
+import pandas as pd
+import pytest
+
+from gates.evidence import Evidence
+from gates.pages import rows as module
+from gates.pages.rows import CRITERIA, LARGEST_BYTES, printed_rows, rows_folder, rows_of
+from gates.proof import judge
+
+ROLLOUTS = "artifacts/stress/rollouts.parquet"
+
+
+def read(data):
+    return list(csv.DictReader(io.StringIO(data.decode())))
+
+
+@pytest.fixture(scope="module")
+def rows(whole, judged):
+    return {gate: rows_of(whole, judged(gate)) for gate in "ABCD"}
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_every_number_that_read_a_table_or_document_has_rows(rows, judged, gate):
+    for answer in judged(gate).criteria:
+        own = rows[gate].under(answer)
+        assert own and all(file.kept > 0 or file.of == 0 for file in own), answer.id
+        assert {file.path for file in own} <= set(answer.evidence)
+
+
+def test_rows_are_those_of_the_table_of_one_method_with_their_numbers(rows, whole):
+    """Held against the table as pandas reads it, and a share counted from the file alone."""
+    frame = pd.read_parquet(whole / ROLLOUTS)
+    own = frame[frame["method"] == "flow"].reset_index(drop=True)
+    (file,) = rows["D"].by_method(ROLLOUTS)["flow"]
+    found = read(file.data)
+    assert (file.kept, file.of, file.name) == (len(own), len(own), "stress.rollouts.flow.csv")
+    assert [row["row"] for row in found] == [str(n) for n in range(1, len(own) + 1)]
+    assert [row["outcome"] for row in found] == list(own["outcome"])
+    assert [row["success"] == "true" for row in found] == list(own["success"])
+    ages = [float(row["action_age_p95_s"]) for row in found]
+    np.testing.assert_allclose(ages, own["action_age_p95_s"], rtol=1e-8)
+    assert found[0]["start_sha256"] == own["start_sha256"][0][:12]
+    assert set(rows["D"].by_method(ROLLOUTS)) == set(frame["method"]), "what it is compared with"
+
+
+def test_a_candidate_leads_to_its_own_rows_only(rows, judged):
+    answers = [a for a in judged("D").criteria if a.candidate == "flow" and ROLLOUTS in a.evidence]
+    assert answers
+    for answer in answers:
+        methods = {file.method for file in rows["D"].under(answer) if file.path == ROLLOUTS}
+        assert methods == {"flow"}
+
+
+def test_a_table_that_only_candidates_are_asked_of_has_no_rows_of_others(rows):
+    methods = {file.method for file in rows["D"].of("artifacts/stress/invocations.parquet")}
+    assert methods == {"diffusion", "flow"}
+
+
+def test_a_document_is_its_values_by_place(rows, whole):
+    (file,) = rows["D"].of("artifacts/stress/checker.json")
+    found = {row["place"]: row["value"] for row in read(file.data)}
+    stated = json.loads((whole / "artifacts/stress/checker.json").read_text())
+    assert int(found["checked_actions"]) == stated["checked_actions"] and len(found) == file.of
+    assert {place.split(".")[0].split("[")[0] for place in found} == set(stated)
+
+
+def test_a_row_names_its_rollout_where_the_journal_is_evidence(whole, judged, monkeypatch):
+    report = judged("D")
+    names = {f"artifacts/stress/journals/flow__{name}.mcap": "0" * 64 for name in ("nominal",)}
+    with_journal = report.model_copy(update={"materials": {**report.materials, **names}})
+    (file,) = rows_of(whole, with_journal).by_method(ROLLOUTS)["flow"]
+    for row in read(file.data):
+        name = f"flow/{row['perturbation']}/{row['start']}"
+        assert row["rollout"] == (name if row["perturbation"] == "nominal" else "")
+
+
+def test_evidence_of_other_bytes_has_no_rows(copied, judged):
+    """Written anew the table is another one than was judged, and nothing of it is shown."""
+    evidence.edit_table(copied, "stress/rollouts.parquet", lambda f: f.assign(force_peak_n=1.0))
+    rows = rows_of(copied, judged("D"))
+    assert rows.of(ROLLOUTS) == [] and rows.of("artifacts/stress/power.json")
+    (copied / "artifacts/stress/power.json").unlink()
+    assert rows_of(copied, judged("D")).of("artifacts/stress/power.json") == []
+
+
+def test_a_table_is_read_once_for_all_its_printings(whole, judged, monkeypatch):
+    before = rows_of(whole, judged("C"))
+    monkeypatch.setattr(module, "table_of", None)
+    assert rows_of(whole, judged("C")) == before
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_files_are_bounded_and_have_names_of_their_own(rows, gate):
+    names = [file.name for file in rows[gate].files]
+    assert len(set(names)) == len(names) and CRITERIA not in names
+    assert all(len(file.data) <= LARGEST_BYTES for file in rows[gate].files)
+
+
+def test_of_a_larger_table_a_sample_is_kept_that_says_so(rows):
+    (file,) = [f for f in rows["D"].of("artifacts/stress/invocations.parquet")
+               if f.method == "flow"]  # fmt: skip
+    found = [int(row["row"]) for row in read(file.data)]
+    assert 0 < file.kept == len(found) < file.of
+    assert file.said == f"a sample of {file.kept:,} of {file.of:,} rows"
+    assert len(file.data) > LARGEST_BYTES - 200, "as many as fit"
+    assert found == sorted(set(found)) and found[-1] <= file.of
+    # Drawn, not every so manieth: no condition or repeat is favoured by the order of the table.
+    assert len(set(np.diff(found))) > 3 and abs(np.mean(found) / file.of - 0.5) < 0.05
+
+
+def test_a_text_that_a_spreadsheet_would_run_stays_text(whole, copied):
+    bad = '=HYPERLINK("x","y"),\n'
+    evidence.edit_table(
+        copied, "stress/rollouts.parquet", lambda f: f.assign(rejected_by=bad, force_peak_n=-1.0)
+    )
+    report = judge(copied, "D")
+    (file,) = rows_of(copied, report).by_method(ROLLOUTS)["flow"]
+    found = read(file.data)
+    assert {row["rejected_by"] for row in found} == {f"'{bad}"}
+    assert {row["force_peak_n"] for row in found} == {"-1"}, "a number is no text"
+
+
+def test_names_that_are_no_names_of_files_meet_no_other(copied):
+    names = {"flow": "a/../b", "diffusion": "a_.._b"}
+    evidence.edit_table(
+        copied, "stress/rollouts.parquet", lambda f: f.assign(method=f["method"].replace(names))
+    )
+    files = rows_of(copied, judge(copied, "D")).of(ROLLOUTS)
+    assert len({file.name for file in files}) == len(files)
+    assert all("/" not in file.name and ".." not in file.name.replace("...", "") for file in files)
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_the_criteria_stand_beside_them_with_all_digits(rows, judged, gate):
+    printed = printed_rows(rows[gate], judged(gate))
+    found = read(printed[CRITERIA])
+    assert len(found) == len(judged(gate).criteria)
+    for row, answer in zip(found, judged(gate).criteria, strict=True):
+        assert (row["criterion"], row["candidate"]) == (answer.id, answer.candidate or "")
+        assert (float(row["measured"]) if row["measured"] else None) == answer.measured
+        assert (row["low"] == "") == (answer.interval is None)
+        assert set(row["rows"].split()) <= set(printed) and row["rows"]
+
+
+def test_without_evidence_the_criteria_still_stand_there(tmp_path, judged):
+    rows = rows_of(tmp_path, judged("D"))
+    assert rows.files == () and set(printed_rows(rows, judged("D"))) == {CRITERIA}
+    assert rows_folder("D") == "reports/gate_d" and rows.folder == "gate_d"
+
+
+def test_evidence_is_only_read(whole, judged):
+    """What is shown is what `Evidence` hashes too."""
+    report = judged("C")
+    digests = {path: Evidence(whole).digest(path) for path in report.materials}
+    rows_of(whole, report)
+    assert digests == dict(report.materials)
