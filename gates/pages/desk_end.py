@@ -70,7 +70,7 @@ def _hashes(report: GateReport) -> tuple[str, ...]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    """SHA-256 of what the report holds under one key, as canonical JSON."""
+    """SHA-256 of what the report holds under one key, written as the report is."""
     return sha256_bytes(canonical_json(dict(content)))
 
 

@@ -30,8 +30,8 @@ def test_hashes_are_those_that_a_reader_makes_of_the_report(end, judged):
 
 
 def _digest(content):
-    """Keys sorted, no spaces: as the page says."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    """Sorted keys, two spaces, a last newline: as the page says."""
+    text = json.dumps(content, sort_keys=True, indent=2, ensure_ascii=False) + "\n"
     return hashlib.sha256(text.encode()).hexdigest()
 
 
