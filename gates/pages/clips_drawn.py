@@ -1,18 +1,19 @@
 """A rollout as a moving drawing: from above and from the side, with force and age under it.
 
-SVG with its own animation, so that the page needs no script: it stands still at the end with the
-whole path, and plays when it is clicked. Nothing in it comes from text of the evidence but names of
-phases and modes, which are escaped.
+Every moment is a drawing of its own on top of what stands still, and a radio button shows it; the
+style sheet plays them one after the other. So the page needs no script, and a keyboard plays,
+pauses and steps with the browser's own controls. Nothing in it comes from text of the evidence but
+names of phases and modes, which are escaped.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup, escape
 
 from gates.evidence import Array
 from gates.pages.reasons import personal
-from genpolicy.replay.film import PERIOD_S, Film, Frame, Outline
+from genpolicy.replay.film import PERIOD_S, Film, Frame
 from genpolicy.replay.views import ABOVE, View, views_of
 from genpolicy.tasks.api import Workspace
 
@@ -27,31 +28,70 @@ OTHERS = {"fallback": "fallback", "intervention": "person"}
 LEAST_WIDE = 6.0
 
 
+SHOW = (
+    ("whole", "end"),
+    ("run", "play"),
+    ("hold", "pause"),
+    ("step", "step"),
+)
+"""Controls of a clip: class for the style sheet, and name; the first is how a page begins."""
+
+
 def drawn_clip(film: Film, workspace: Workspace, number: int, *, said: str) -> Markup:
-    """The drawing of a film.
+    """The drawing of a film and its controls.
 
     Args:
         film: What to draw.
         workspace: Where the TCP may be: what is shown, the same in every clip.
-        number: Of the clip on its page; a click on it plays it and no other.
+        number: Of the clip on its page; its controls move it and no other.
         said: What it shows, for who does not see it.
     """
     name = f"clip{number}"
     views = views_of(workspace, width=WIDTH, gap=GAP)
     top = max(view.height for view in views)
     height = top + 2 * (LABELS + STRIP) + LABELS
+    box = Markup('viewBox="0 0 {:.0f} {:.0f}"').format(WIDTH, height)
     parts = [
         Markup(
-            '<svg class="clip" id="{}" viewBox="0 0 {:.0f} {:.0f}" role="img" '
-            'aria-label="{}: a rollout from above and from the side; a click plays it">'
-        ).format(name, WIDTH, height, said)
+            '<div class="clip" role="group" aria-label="{}"><svg {} role="img" '
+            'aria-label="{}: a rollout from above and from the side">'
+        ).format(said, box, said)
     ]
-    for view, title in zip(views, ("from above", "from the side"), strict=True):
-        parts += [*_view(film, view, name), _text(view.left + 3, 11, title)]
+    layers = [_layers(film, view) for view in views]
+    titles = ("from above", "from the side")
+    for view, (still, _), title in zip(views, layers, titles, strict=True):
+        parts += [*_still(film, view, name, still), _text(view.left + 3, 11, title)]
     parts += _strip(film, FORCE, film.forces, top)
     parts += _strip(film, AGE, film.ages, top + LABELS + STRIP)
-    parts += [*_phases(film, height), *_hand_of_time(film, name, top, height), Markup("</svg>")]
-    return Markup("").join(parts)
+    parts += [*_phases(film, height), Markup("</svg>"), *_controls(name)]
+    for place in range(len(film.frames)):
+        at_s = min(place * PERIOD_S, film.duration_s)
+        parts += [
+            Markup(
+                '<input type="radio" name="{}at" aria-label="{:.1f} s"{}>'
+                '<svg class="moment" style="--k:{}" {} aria-hidden="true">'
+            ).format(name, at_s, Markup("" if place else " checked"), place, box),
+            *(
+                _clipped(view, name, moving[place])
+                for view, (_, moving) in zip(views, layers, strict=True)
+            ),
+            Markup('<path class="now" d="M{:.1f} {:.1f}V{:.1f}"/></svg>').format(
+                _x(film, at_s), top, height - LABELS
+            ),
+        ]
+    return Markup("").join([*parts, Markup("</div></div>")])
+
+
+def _controls(name: str) -> Iterator[Markup]:
+    """The radio buttons of a clip, and the beginning of those of its moments."""
+    yield Markup("<fieldset><legend>Show</legend>")
+    for place, (kind, label) in enumerate(SHOW):
+        yield Markup('<label><input type="radio" name="{}" class="{}"{}> {}</label> ').format(
+            name, kind, Markup("" if place else " checked"), label
+        )
+    yield Markup(
+        '</fieldset><div class="moments" role="group" aria-label="Moments: arrow keys step">'
+    )
 
 
 def _points(view: View, outline: Array) -> str:
@@ -59,39 +99,45 @@ def _points(view: View, outline: Array) -> str:
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in view.places(outline).tolist())
 
 
-def _view(film: Film, view: View, name: str) -> Iterator[Markup]:
-    """Scene, path, what is held and the hand, clipped to the view."""
+def _layers(film: Film, view: View) -> tuple[list[Markup], list[list[Markup]]]:
+    """Outlines that stand still all the time, and those of each frame that do not."""
+    every = [list(_outlines(frame, view)) for frame in film.frames]
+    still = [shape for shape in every[0] if all(shape in shapes for shapes in every)]
+    return still, [[shape for shape in shapes if shape not in still] for shapes in every]
+
+
+def _outlines(frame: Frame, view: View) -> Iterator[Markup]:
+    """Scene, what is held and the hand, as they stand in a frame."""
+    for kind, outline in (*frame.scene, ("held", frame.held), ("hand", frame.hand)):
+        if outline is not None:
+            corners = _points(view, outline[view.side])
+            yield Markup('<polygon class="{}" points="{}"/>').format(kind, corners)
+
+
+def _still(film: Film, view: View, name: str, shapes: Sequence[Markup]) -> Iterator[Markup]:
+    """Table, what never moves, and the way of the hand."""
     panel = (WIDTH - GAP) / 2
-    yield Markup('<svg x="{:.1f}" width="{:.1f}" height="{:.1f}" viewBox="{} 0 {} {}">').format(
-        view.left, panel, view.height,
-        *(f"{number:.1f}" for number in (view.left, panel, view.height)),
-    )  # fmt: skip
-    yield Markup('<rect class="table" x="{:.1f}" width="{:.1f}" height="{:.1f}"/>').format(
+    place = Markup('x="{:.1f}" width="{:.1f}" height="{:.1f}"').format(
         view.left, panel, view.height
     )
-    for place, (kind, _) in enumerate(film.frames[-1].scene):
-        yield _moving(film, view, kind, lambda frame, place=place: frame.scene[place][1], name)  # type: ignore[misc]
+    yield Markup('<clipPath id="{}"><rect {}/></clipPath>').format(_window(view, name), place)
+    yield Markup('<rect class="table" {}/>').format(place)
+    way = Markup("")
     if len(film.path_m):
         axes = [0, 1] if view.side == ABOVE else [0, 2]
-        path = _points(view, film.path_m[:, axes])
-        yield Markup('<polyline class="path" points="{}"/>').format(path)
-    yield _moving(film, view, "held", lambda frame: frame.held, name)
-    yield _moving(film, view, "hand", lambda frame: frame.hand, name)
-    yield Markup("</svg>")
+        way = Markup('<polyline class="path" points="{}"/>').format(
+            _points(view, film.path_m[:, axes])
+        )
+    yield _clipped(view, name, [*shapes, way])
 
 
-def _moving(
-    film: Film, view: View, kind: str, of: Callable[[Frame], Outline | None], name: str
-) -> Markup:
-    """One outline over all frames; one that never moves is not animated."""
-    found = [of(frame) for frame in film.frames]
-    values = ["" if outline is None else _points(view, outline[view.side]) for outline in found]
-    if len(set(values)) == 1:
-        return Markup('<polygon class="{}" points="{}"/>').format(kind, values[-1])
-    return Markup(
-        '<polygon class="{}" points="{}"><animate attributeName="points" begin="{}.click" '
-        'dur="{:.1f}s" calcMode="discrete" values="{}"/></polygon>'
-    ).format(kind, values[-1], name, len(values) * PERIOD_S, ";".join(values))
+def _clipped(view: View, name: str, shapes: Sequence[Markup]) -> Markup:
+    inside = Markup("").join(shapes)
+    return Markup('<g clip-path="url(#{})">{}</g>').format(_window(view, name), inside)
+
+
+def _window(view: View, name: str) -> str:
+    return f"{name}{'above' if view.side == ABOVE else 'side'}"
 
 
 @dataclass(frozen=True)
@@ -157,15 +203,6 @@ def _spans(
     for place, (begin_s, name) in enumerate(marks):
         later = marks[place + 1][0] if place + 1 < len(marks) else film.duration_s
         yield name, begin_s, later
-
-
-def _hand_of_time(film: Film, name: str, top: float, height: float) -> Iterator[Markup]:
-    """The line that goes through the strips while the clip plays."""
-    yield Markup(
-        '<path class="now" d="M0 {:.1f}V{:.1f}" transform="translate({:.0f})">'
-        '<animateTransform attributeName="transform" type="translate" begin="{}.click" '
-        'dur="{:.1f}s" values="0;{:.0f}"/></path>'
-    ).format(top, height - LABELS, WIDTH, name, len(film.frames) * PERIOD_S, WIDTH)
 
 
 def _x(film: Film, at_s: float) -> float:

@@ -4,6 +4,7 @@ Palette: Okabe and Ito 2008.
 """
 
 import io
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -47,6 +48,11 @@ STYLE: Any = {
     "lines.linewidth": 1.6,
 }
 
+POINTS_PER_INCH = 72.0
+"""One unit of a drawing is a point."""
+LEAST_TEXT_PX = 9.0
+"""No text of a plot is shown smaller than this: on a narrow screen the plot scrolls instead."""
+TEXT_SIZE = re.compile(r"font(?:-size)?: [^;\"]*?([\d.]+)px")
 NUMBER = re.compile(r"-?\d+\.\d{3,}")
 NAME = re.compile(r' id="([^"]+)"')
 REFERENCE = re.compile(r'(?:href="#|url\(#)([^")]+)')
@@ -100,7 +106,11 @@ def drawn(draw: Callable[[], Figure], label: str, *, salt: str) -> Markup:
 
 
 def svg(figure: Figure, label: str) -> Markup:
-    """The figure as an SVG element for HTML: no remote name, no style of its own."""
+    """The figure as an SVG element for HTML: no remote name, no style of its own.
+
+    It stands in an element that scrolls sideways where the page is narrower than `--least`, the
+    width at which its smallest text has `LEAST_TEXT_PX`.
+    """
     sink = io.StringIO()
     FigureCanvasSVG(figure)
     nothing = {"Creator": None, "Date": None, "Format": None, "Type": None}
@@ -116,10 +126,13 @@ def svg(figure: Figure, label: str) -> Markup:
     used = set(REFERENCE.findall(body))
     body = NAME.sub(lambda name: name.group(0) if name.group(1) in used else "", body)
     body = re.sub(r' d="[^"]*"', lambda path: NUMBER.sub(_rounded, path.group(0)), body)
-    start = Markup('<svg role="img" aria-label="{}" {}>').format(
-        label, Markup(box.group(0) if box else "")
-    )
-    return start + Markup(body.strip())
+    smallest = min(map(float, TEXT_SIZE.findall(body)), default=LEAST_TEXT_PX)
+    least = math.ceil(POINTS_PER_INCH * figure.get_figwidth() * LEAST_TEXT_PX / smallest)
+    start = Markup(
+        '<div class="plot" style="--least:{}px" tabindex="0" role="group" aria-label="{}, '
+        'scrolls sideways on a narrow screen"><svg role="img" aria-label="{}" {}>'
+    ).format(least, label, label, Markup(box.group(0) if box else ""))
+    return start + Markup(body.strip()) + Markup("</div>")
 
 
 def _rounded(number: re.Match[str]) -> str:

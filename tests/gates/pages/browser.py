@@ -1,0 +1,92 @@
+"""Pages in Chromium without a window: what is shown at a width, and how many sheets they print on."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+PATIENCE_S = 240.0
+SHEET = re.compile(rb"/Type\s*/Page\b")
+PAPER_PX = 710
+"""Width between the margins of A4, the narrower of the usual two; one px is 1/96 inch."""
+MEASURE = """
+addEventListener('load', () => {
+  const page = document.querySelector('iframe').contentDocument, view = page.defaultView
+  const wide = page.documentElement.clientWidth
+  const seen = one => one.getClientRects().length > 0 && view.getComputedStyle(one).visibility != 'hidden'
+  const name = one => `${one.tagName} ${one.className.baseVal ?? one.className}: ${one.textContent.trim().slice(0, 40)}`
+  const size = one => {
+    const way = one.getScreenCTM()
+    return parseFloat(view.getComputedStyle(one).fontSize) * Math.sqrt(way.a * way.d - way.b * way.c)
+  }
+  const told = {texts: [], outside: [], sideways: [], unannounced: [], wide: page.documentElement.scrollWidth - wide}
+  for (const one of page.querySelectorAll('svg text')) if (seen(one)) told.texts.push([size(one), one.textContent])
+  for (const one of page.querySelectorAll('body *')) {
+    const box = one.getBoundingClientRect(), cut = one.scrollWidth > one.clientWidth + 1
+    if (!seen(one) || (one.ownerSVGElement && one.tagName != 'text')) continue
+    if ((box.right > wide + 1 || box.left < -1) && box.width > 0) told.outside.push(name(one))
+    if (cut && one.clientWidth > 0 && view.getComputedStyle(one).overflowX != 'visible') told.sideways.push(name(one))
+  }
+  for (const one of page.querySelectorAll('.plot')) {
+    const said = parseFloat(view.getComputedStyle(one, '::before').height) > 10
+    if (seen(one) && said != one.scrollWidth > one.clientWidth + 1) told.unannounced.push(name(one))
+  }
+  document.querySelector('pre').textContent = JSON.stringify(told)
+})
+"""
+
+
+def chromium() -> str | None:
+    """The browser's command, or None where it is not installed."""
+    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+
+
+def sheets(page: Path, folder: Path) -> int:
+    """On how many sheets a page prints, at the browser's own paper size."""
+    printed = folder / f"{page.stem}.pdf"
+    _run(["--no-pdf-header-footer", f"--print-to-pdf={printed}", page.resolve().as_uri()])
+    return len(SHEET.findall(printed.read_bytes()))
+
+
+def measured(text: str, folder: Path, *, width_px: int, paper: bool = False) -> dict[str, Any]:
+    """What of a page is shown at a width.
+
+    Args:
+        text: The page.
+        folder: For what the browser is given to open.
+        width_px: Of the screen or of the paper between its margins.
+        paper: By the rules for paper instead of those for a screen.
+
+    Returns:
+        Size in px and words of each text of a drawing, what reaches outside the page, what is cut
+        or scrolls sideways, plots whose note on that is missing or stands without need, and by how
+        much the page as a whole is wider than the screen, px.
+    """
+    text = re.sub(r"<meta http-equiv[^>]*>", "", text)
+    if paper:
+        text = text.replace("@media screen and", "@media print and").replace(
+            "@media print{", "@media all{"
+        )
+    inner = html.escape(text, quote=True)
+    opened = folder / "measured.html"
+    opened.write_text(
+        f'<!DOCTYPE html><iframe style="border:0;height:900px;width:{width_px}px" srcdoc="{inner}">'
+        f"</iframe><pre></pre><script>{MEASURE}</script>"
+    )
+    said = _run(["--window-size=1200,1000", "--dump-dom", opened.resolve().as_uri()])
+    found = re.search(r"<pre>(\{.*\})</pre>", said, flags=re.DOTALL)
+    assert found, said[-2000:]
+    return json.loads(html.unescape(found.group(1)))
+
+
+def _run(arguments: list[str]) -> str:
+    command = chromium()
+    assert command is not None
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+    done = subprocess.run(
+        [command, *flags, *arguments], capture_output=True, timeout=PATIENCE_S, check=True
+    )
+    return done.stdout.decode()
