@@ -1,4 +1,4 @@
-"""Pages in Chromium without a window: what is shown at a width, and how many sheets they print on."""
+"""Pages in Chromium without a window: what is shown at a width, and on how many sheets."""
 
 import html
 import json
@@ -10,31 +10,39 @@ from typing import Any
 
 PATIENCE_S = 240.0
 SHEET = re.compile(rb"/Type\s*/Page\b")
-PAPER_PX = 710
+PAPER_PX = 718
 """Width between the margins of A4, the narrower of the usual two; one px is 1/96 inch."""
 MEASURE = """
 addEventListener('load', () => {
   const page = document.querySelector('iframe').contentDocument, view = page.defaultView
+  const all = (which) => [...page.querySelectorAll(which)].filter(seen)
+  const look = (one, part) => view.getComputedStyle(one, part)
+  const seen = (one) => one.getClientRects().length > 0 && look(one).visibility != 'hidden'
   const wide = page.documentElement.clientWidth
-  const seen = one => one.getClientRects().length > 0 && view.getComputedStyle(one).visibility != 'hidden'
-  const name = one => `${one.tagName} ${one.className.baseVal ?? one.className}: ${one.textContent.trim().slice(0, 40)}`
-  const size = one => {
+  const name = (one) => `${one.tagName} ${one.textContent.trim().slice(0, 40)}`
+  const size = (one) => {
     const way = one.getScreenCTM()
-    return parseFloat(view.getComputedStyle(one).fontSize) * Math.sqrt(way.a * way.d - way.b * way.c)
+    return parseFloat(look(one).fontSize) * Math.sqrt(way.a * way.d - way.b * way.c)
   }
-  const told = {texts: [], outside: [], sideways: [], unannounced: [], wide: page.documentElement.scrollWidth - wide}
-  for (const one of page.querySelectorAll('svg text')) if (seen(one)) told.texts.push([size(one), one.textContent])
-  for (const one of page.querySelectorAll('body *')) {
-    const box = one.getBoundingClientRect(), cut = one.scrollWidth > one.clientWidth + 1
-    if (!seen(one) || (one.ownerSVGElement && one.tagName != 'text')) continue
-    if ((box.right > wide + 1 || box.left < -1) && box.width > 0) told.outside.push(name(one))
-    if (cut && one.clientWidth > 0 && view.getComputedStyle(one).overflowX != 'visible') told.sideways.push(name(one))
+  const cut = (one) => one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1
+  const out = (one) => {
+    const box = one.getBoundingClientRect()
+    return box.width > 0 && (box.right > wide + 1 || box.left < -1)
   }
-  for (const one of page.querySelectorAll('.plot')) {
-    const said = parseFloat(view.getComputedStyle(one, '::before').height) > 10
-    if (seen(one) && said != one.scrollWidth > one.clientWidth + 1) told.unannounced.push(name(one))
+  const said = (one) => {
+    const note = look(one, '::before')
+    return note.content != 'none' && parseFloat(note.height) > 10
   }
-  document.querySelector('pre').textContent = JSON.stringify(told)
+  const boxes = all('body *').filter((one) => !one.ownerSVGElement || one.tagName == 'text')
+  document.querySelector('pre').textContent = JSON.stringify({
+    texts: all('svg text').map((one) => [size(one), one.textContent]),
+    outside: boxes.filter(out).map(name),
+    sideways: boxes.filter((one) => cut(one) && look(one).overflowX != 'visible').map(name),
+    unannounced: all('.plot').filter((one) => said(one) != cut(one)).map(name),
+    moments: all('.moment').map((one) => one.getAttribute('style')),
+    buttons: all('input').length,
+    wide: page.documentElement.scrollWidth - wide,
+  })
 })
 """
 
@@ -62,8 +70,9 @@ def measured(text: str, folder: Path, *, width_px: int, paper: bool = False) -> 
 
     Returns:
         Size in px and words of each text of a drawing, what reaches outside the page, what is cut
-        or scrolls sideways, plots whose note on that is missing or stands without need, and by how
-        much the page as a whole is wider than the screen, px.
+        or scrolls sideways, plots whose note on that is missing or stands without need, by how much
+        the page as a whole is wider than the screen, px, and which moments and how many buttons of
+        clips are seen.
     """
     text = re.sub(r"<meta http-equiv[^>]*>", "", text)
     if paper:

@@ -161,28 +161,49 @@ def test_without_gate_d_and_without_journals_it_is_said(whole, judged):
     assert "is missing" in clips_of({"D": judged("D")}, Evidence(whole)).missing
 
 
-class Ids(HTMLParser):
-    """Ids of a page, and what its animations begin with."""
+class Controls(HTMLParser):
+    """Radio buttons of a page by group, each with its name and whether it is chosen; scripts."""
 
     def __init__(self):
         super().__init__()
-        self.ids, self.begun, self.scripts = [], set(), 0
+        self.scripts, self.inside, self.named = 0, [], []
 
     def handle_starttag(self, tag, attrs):
         told = dict(attrs)
-        self.scripts += tag == "script"
-        if "id" in told:
-            self.ids.append(told["id"])
-        if tag.startswith("animate"):
-            self.begun.add(told["begin"])
+        self.scripts += tag == "script" or any(name.startswith("on") for name in told)
+        if tag == "label":
+            self.inside.append("")
+        if tag == "input":
+            assert told["type"] == "radio" and "tabindex" not in told and "disabled" not in told
+            self.named.append((told, told.get("aria-label", "")))
+
+    def handle_data(self, data):
+        if self.inside and self.named:
+            told, name = self.named[-1]
+            self.named[-1] = (told, name + data)
+
+    def handle_endtag(self, tag):
+        if tag == "label":
+            self.inside.pop()
+
+    def told(self):
+        groups = {}
+        for told, name in self.named:
+            groups.setdefault(told["name"], []).append((name.strip(), "checked" in told))
+        return groups
 
 
-def test_a_click_plays_its_own_clip_without_any_script(watched):
+def test_each_clip_has_named_buttons_of_its_own_and_no_script(watched):
     write_gate(watched, "D")
-    page = Ids()
+    page = Controls()
     text = index_page(watched)
     page.feed(text)
-    clips = [name for name in page.ids if name.startswith("clip")]
-    assert len(clips) == len(set(clips)) >= 3
-    assert page.begun == {f"{name}.click" for name in clips} and not page.scripts
+    groups = page.told()
+    clips = sorted(name for name in groups if not name.endswith("at"))
+    assert len(clips) == text.count('<div class="clip"') >= 3 and not page.scripts
+    for name in clips:
+        assert groups[name] == [("end", True), ("play", False), ("pause", False), ("step", False)]
+        moments = groups[f"{name}at"]
+        assert [f"{k / 10:.1f} s" for k in range(len(moments))] == [said for said, _ in moments]
+        assert [chosen for _, chosen in moments] == [True] + [False] * (len(moments) - 1)
     assert text == index_page(watched)

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from gates.pages.clips_drawn import GAP, STRIP, WIDTH, drawn_clip
-from genpolicy.replay.film import Film, Frame
+from gates.pages.clips_drawn import GAP, SHOW, STRIP, WIDTH, drawn_clip
+from genpolicy.pages.style import page_style
+from genpolicy.replay.film import PERIOD_S, Film, Frame
 from genpolicy.replay.views import MARGIN_M
 from genpolicy.tasks.api import Workspace
 
@@ -42,8 +43,15 @@ def of_class(svg, name):
     return re.findall(rf'<(?:polygon|polyline) class="{name}" points="([^"]*)"', str(svg))
 
 
+def moments(svg):
+    """The drawing of each moment, by its number."""
+    found = re.findall(r'<svg class="moment" style="--k:(\d+)"[^>]*>(.*?)</svg>', str(svg))
+    assert [int(number) for number, _ in found] == list(range(len(found)))
+    return [inner for _, inner in found]
+
+
 def test_places_are_to_scale_and_up_is_up():
-    above, aside = of_class(drawn_clip(film(), SPACE, 1, said="largest force"), "hand")
+    above, aside = of_class(moments(drawn_clip(film(), SPACE, 1, said="largest force"))[-1], "hand")
     middle = np.mean(points(above), axis=0)
     assert middle[0] == pytest.approx((0.6 - 0.3 + MARGIN_M) * SCALE, abs=0.1)
     height = (0.4 + 2 * MARGIN_M) * SCALE
@@ -54,21 +62,38 @@ def test_places_are_to_scale_and_up_is_up():
     assert side[1] == pytest.approx(lower - (0.1 + MARGIN_M) * SCALE, abs=0.1)
 
 
-def test_it_stands_at_the_end_and_plays_from_the_beginning():
-    svg = str(drawn_clip(film(), SPACE, 7, said="largest force"))
-    (values,) = set(re.findall(r'class="hand" points="[^"]*"><animate [^>]*values="([^"]*)"', svg)
-                    [:1])  # fmt: skip
-    frames = values.split(";")
-    assert len(frames) == 3 and frames[0] == "" and frames[1] != frames[2]
-    assert of_class(svg, "hand")[0] == frames[2]
-    assert set(re.findall(r'begin="([^"]*)"', svg)) == {"clip7.click"}
-    assert set(re.findall(r'dur="([^"]*)"', svg)) == {"0.3s"}
+def test_each_moment_shows_its_own_frame_and_time():
+    svg = drawn_clip(film(), SPACE, 7, said="largest force")
+    hands = [of_class(moment, "hand") for moment in moments(svg)]
+    assert hands[0] == [] and len(hands) == 3 and hands[1] != hands[2]
+    lines = [re.search(r'class="now" d="M([\d.]+) ', moment).group(1) for moment in moments(svg)]
+    assert list(map(float, lines)) == [0.0, WIDTH * 0.1 / 2, WIDTH * 0.2 / 2]
+    assert re.findall(r'name="clip7at" aria-label="([^"]*)"', svg) == ["0.0 s", "0.1 s", "0.2 s"]
 
 
-def test_what_stands_still_is_not_animated():
-    svg = str(drawn_clip(film(), SPACE, 1, said="largest force"))
-    assert len(re.findall(r'class="obstacle" points="[^"]*"/>', svg)) == 2
-    assert of_class(svg, "held") == ["", ""]
+def test_what_stands_still_is_drawn_once():
+    svg = drawn_clip(film(), SPACE, 1, said="largest force")
+    assert len(of_class(svg, "obstacle")) == 2 and of_class(svg, "held") == []
+    assert not any(of_class(moment, "obstacle") for moment in moments(svg))
+    moving = [Frame(None, None, (("obstacle", square(x, 0.0)),)) for x in (0.4, 0.5)]
+    svg = drawn_clip(film(frames=tuple(moving)), SPACE, 1, said="largest force")
+    assert [len(of_class(moment, "obstacle")) for moment in moments(svg)] == [2, 2]
+
+
+def test_every_control_is_played_by_a_rule_of_the_style_sheet():
+    """Without its rule a button would be there and do nothing; a browser shows what they do."""
+    style = str(page_style())
+    rules = dict(re.findall(r"([^{}]+)\{([^{}]*)\}", style))
+    said = {kind: [body for heads, body in rules.items() if f".{kind}:checked" in heads]
+            for kind, _ in SHOW}  # fmt: skip
+    assert said["whole"] == ["visibility:visible"]
+    assert "visibility:visible" in said["step"] and "display:none" in said["step"]
+    length = f"{PERIOD_S:g}".removeprefix("0")
+    played = f"animation:shown {length}s calc(var(--k)*{length}s)"
+    assert said["run"] == [played, "animation-fill-mode:forwards"]
+    assert said["hold"] == [played, "animation-fill-mode:forwards", "animation-play-state:paused"]
+    assert {kind for kind, _ in SHOW} == set(re.findall(r' class="(\w+)"(?: checked)?> ', str(
+        drawn_clip(film(), SPACE, 1, said="a"))))  # fmt: skip
 
 
 def test_bars_are_as_high_as_what_was_measured():

@@ -1,0 +1,91 @@
+"""Pages as a browser shows them on a narrow screen and prints them; skipped where there is none."""
+
+import shutil
+
+import browser
+import pytest
+from test_clips_drawn import SPACE, film
+
+from gates.pages.clips_drawn import drawn_clip
+from gates.pages.page import gate_page, index_page
+from gates.report import read_report
+from gates.writing import write_gate
+from genpolicy.pages.figures.drawing import LEAST_TEXT_PX
+from genpolicy.pages.style import page_style
+
+pytestmark = pytest.mark.skipif(
+    browser.chromium() is None,
+    reason="no Chromium on this machine: it alone counts sheets and measures what is shown",
+)
+NARROW_PX = 420
+NAMES = ("gate_a", "gate_b", "gate_c", "gate_d", "gate_e", "index")
+DRAWN = {"gate_a", "gate_b", "gate_c", "gate_d"}
+SHEETS = dict.fromkeys(NAMES, 6) | {"gate_e": 2}
+
+
+@pytest.fixture(scope="module")
+def pages(_ladder, tmp_path_factory):
+    root = tmp_path_factory.mktemp("shown") / "repo"
+    shutil.copytree(_ladder, root)
+    write_gate(root, "E")
+    gates = {f"gate_{g.lower()}": gate_page(root, read_report(root, g)[0]) for g in "ABCDE"}
+    return {**gates, "index": index_page(root)}
+
+
+def page_of(inner):
+    return f"<!DOCTYPE html><title>a</title><style>{page_style()}</style><main>{inner}</main>"
+
+
+def on_paper(text, folder):
+    return browser.measured(text, folder, width_px=browser.PAPER_PX, paper=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_prints_on_few_sheets_with_nothing_cut(pages, name, tmp_path):
+    page = tmp_path / f"{name}.html"
+    page.write_text(pages[name])
+    assert 1 <= browser.sheets(page, tmp_path) <= SHEETS[name]
+    told = on_paper(pages[name], tmp_path)
+    assert told["outside"] == [] and told["sideways"] == [] and told["wide"] == 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_text_of_a_drawing_can_be_read_on_a_narrow_screen(pages, name, tmp_path):
+    told = browser.measured(pages[name], tmp_path, width_px=NARROW_PX)
+    assert min([size for size, _ in told["texts"]], default=LEAST_TEXT_PX) >= LEAST_TEXT_PX
+    assert told["wide"] == 0 and told["unannounced"] == []
+    assert bool(told["texts"]) == (name in DRAWN)
+
+
+def test_a_clip_can_be_read_and_shows_one_moment(tmp_path):
+    clip = drawn_clip(film(), SPACE, 1, said="slowest success")
+    text = page_of(f'<div class="series clips"><div class="small">{clip}</div></div>')
+    told = browser.measured(text, tmp_path, width_px=NARROW_PX)
+    assert min(size for size, _ in told["texts"]) >= LEAST_TEXT_PX and told["wide"] == 0
+    assert told["moments"] == ["--k:2"] and told["buttons"] == 4
+    assert on_paper(text, tmp_path)["moments"] == ["--k:2"]
+    step = text.replace(" checked", "", 1).replace('class="step"', 'class="step" checked')
+    told = browser.measured(step, tmp_path, width_px=NARROW_PX)
+    assert told["moments"] == ["--k:0"] and told["buttons"] == 4 + 3
+    assert on_paper(step, tmp_path)["moments"] == ["--k:2"]
+    assert on_paper(step, tmp_path)["buttons"] == 0
+
+
+def test_what_is_wrong_is_seen(tmp_path):
+    small = '<svg viewBox="0 0 800 9"><text y="9" style="font-size:9px">a</text></svg>'
+    plot = f'<div class="plot" style="--least:10px">{small}</div>'
+    told = browser.measured(page_of(plot), tmp_path, width_px=NARROW_PX)
+    assert told["texts"][0][0] < LEAST_TEXT_PX
+    silent = f"<style>.plot::before{{content:none!important}}</style>{plot}".replace(
+        "10px", "800px"
+    )
+    assert browser.measured(page_of(silent), tmp_path, width_px=NARROW_PX)["unannounced"]
+    wide = '<table><tr><td style="white-space:nowrap">' + "word " * 300 + "</td></tr></table>"
+    assert on_paper(page_of(wide), tmp_path)["outside"]
+    assert on_paper(page_of(f'<div style="overflow:hidden">{wide}</div>'), tmp_path)["sideways"]
+
+
+def test_sheets_are_counted(tmp_path):
+    page = tmp_path / "three.html"
+    page.write_text(page_of('<p style="break-after:page">a</p>' * 2 + "<p>b</p>"))
+    assert browser.sheets(page, tmp_path) == 3
