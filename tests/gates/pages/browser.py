@@ -31,7 +31,7 @@ addEventListener('load', () => {
   }
   const said = (one) => {
     const note = look(one, '::before')
-    return note.content != 'none' && parseFloat(note.height) > 10
+    return note.content != 'none' && parseFloat(note.paddingBottom) > 10
   }
   const boxes = all('body *').filter((one) => !one.ownerSVGElement || one.tagName == 'text')
   document.querySelector('pre').textContent = JSON.stringify({

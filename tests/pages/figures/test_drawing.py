@@ -8,7 +8,7 @@ import pytest
 from figure_frames import examples, neighbourhoods, strata, support
 
 from genpolicy.pages.figures import checks, situations
-from genpolicy.pages.figures.drawing import drawn
+from genpolicy.pages.figures.drawing import LEAST_TEXT_PX, drawn, new_figure
 from genpolicy.pages.figures.situations import NothingToDrawError
 
 WIDTHS = (1, 2, 3, 26)
@@ -66,3 +66,26 @@ def test_every_width_is_drawn_without_a_warning_and_twice_the_same(width):
 def test_nothing_to_draw_is_said(draw, why):
     with pytest.raises(NothingToDrawError, match=why):
         draw()
+
+
+@pytest.mark.parametrize("size", [3.0, 7.0, 9.0, 20.0])
+def test_a_plot_states_the_width_at_which_its_smallest_text_can_be_read(size):
+    def draw():
+        figure, (axes,) = new_figure()
+        axes.text(0.5, 0.5, "small", fontsize=size)
+        return figure
+
+    svg = str(drawn(draw, "a figure", salt="s"))
+    (least,) = map(int, re.findall(r'^<div class="plot" style="--least:(\d+)px"', svg))
+    wide = float(re.search(r'viewBox="0 0 ([\d.]+)', svg).group(1))
+    assert least - 1 < wide * LEAST_TEXT_PX / min(size, 9.0) <= least
+    assert svg.count("<svg") == 1 and svg.endswith("</svg></div>")
+
+
+def test_a_plot_without_text_may_be_as_narrow_as_it_is_drawn():
+    def draw():
+        figure, (axes,) = new_figure()
+        axes.set_axis_off()
+        return figure
+
+    assert 'style="--least:533px"' in drawn(draw, "a figure", salt="s")
