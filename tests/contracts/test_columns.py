@@ -43,6 +43,10 @@ NO_FRAMES = {
     "event.payload": "an event of a journal",
     "error.errors()[0]": "an error of pydantic",
     "Literal": "a type",
+    "NAMES": "names of gates by letter",
+    "rows_by_gate": "rows of a gate, by its letter",
+    "self.operations": "operations of a network by part",
+    "cost.operations": "the same",
 }
 # A column that a library makes: (file, column).
 MADE = {

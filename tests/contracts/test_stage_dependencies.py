@@ -132,7 +132,8 @@ def test_an_edit_of_a_network_or_sampler_audits_nothing_again() -> None:
 def test_an_edit_of_a_gate_judges_again_and_measures_nothing() -> None:
     for package in ("gates", "gates/pages"):
         direct, _ = rerun_after_edit(package)
-        assert set(direct) <= set(JUDGING)
+        # The first stage runs every time, whatever is edited, and writes the same bytes.
+        assert set(direct) - {"task"} <= set(JUDGING)
 
 
 NEVER = {
