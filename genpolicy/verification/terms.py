@@ -46,7 +46,7 @@ class Terms:
             yield "clock.terms", f"{which} states terms, and does not begin there."
             return
         self._of[m["id"]] = terms
-        wrong = [name for name, took_s in terms.items() if not 0.0 <= took_s < math.inf]
+        wrong = [name for name, value_s in terms.items() if not 0.0 <= value_s < math.inf]
         if wrong:
             yield "clock.terms", f"{which} states no time for {', '.join(wrong)}."
         total_s, own_s = sum(terms.values()), self._begun_s[m["id"]]
