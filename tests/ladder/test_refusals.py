@@ -162,7 +162,8 @@ def test_what_is_not_true_stops_the_next_stage(copy: Path, name: str) -> None:
 def test_the_untouched_ladder_admits_every_stage(copy: Path) -> None:
     """The cases above refuse because of what was done, not because of the copy."""
     card = hashes(copy, "artifacts/card")
-    assert run_stage(copy, "card") == (0, "")
+    code, said = run_stage(copy, "card")
+    assert code == 0, said  # on a busy machine it says that it is still at it
     assert hashes(copy, "artifacts/card") == card
 
 
