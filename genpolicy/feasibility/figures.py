@@ -1,6 +1,9 @@
 """The figures of a cell that the independent checker holds executed rows against."""
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.impedance import STIFFNESS_N_M
@@ -8,9 +11,16 @@ from genpolicy.verification.contact import ExpectedContact
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.projected import ExpectedProjection
 
+Array = NDArray[np.float64]
 
-def expected_motion(robot: Cell) -> ExpectedMotion:
-    """What the independent checker holds executed rows against: figures, none of the layers."""
+
+def expected_motion(robot: Cell, seen: Callable[[Array], Array] | None = None) -> ExpectedMotion:
+    """What the independent checker holds executed rows against: figures, none of the layers.
+
+    Args:
+        robot: The cell.
+        seen: The task's `action_at`, where observations shall be held against measured states.
+    """
     limits, settings = robot.usable_limits, robot.settings
     return ExpectedMotion(
         scene_path=robot.kinematics.scene_path,
@@ -40,4 +50,5 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
             moved_m=settings.position_change_limit_m,
             turned_rad=settings.rotation_change_limit_rad,
         ),
+        seen=seen,
     )

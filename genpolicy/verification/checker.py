@@ -86,7 +86,7 @@ class _Session:
         self.invocations = Invocations()
         self.joined = Joined()
         self.attended = Attended()
-        self.measured = Measured(None if proof is None else proof.forward)
+        self.measured = Measured(proof)
         self.continuity = Continuity()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}

@@ -2,12 +2,17 @@
 
 A rollout states its measured state at every tick and where it ends. Here that is held against the
 joints that chunks were checked from, the observations that the policy saw (whose bytes are proved
-by their hashes), the peaks of the force, and by MuJoCo's kinematics against itself: a state that
-was made up afterwards has to fit all four.
+by their hashes), the peaks of the force, by MuJoCo's kinematics against itself, and from tick to
+tick against how fast the joints can turn: a state that was made up afterwards has to fit all five.
+
+Not proved is what lies between: an arm that moved otherwise from one observation or checked chunk
+to the next, and no faster than it can; an opening of the gripper that no policy saw; and a force
+below the largest so far.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from bisect import insort
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +20,10 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.rotation import rotation_to_6d
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.motion import MotionProof
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
-Forward = Callable[[Array], tuple[Array, Array]]
-"""Position (3,), m, and rotation (3, 3) of the TCP from joint positions (J,), rad."""
 TIMED = "start_sha256"
 """The label of a session that runs on the virtual clock."""
 ROUNDING = 1e-6
@@ -33,7 +37,7 @@ class _State:
     """One state that was stated."""
 
     q_rad: Array
-    tcp_m: Array
+    pose: Array
     force_n: float
 
 
@@ -41,13 +45,15 @@ class Measured:
     """Follows the measured states of one session.
 
     Args:
-        forward: Where the TCP is by joint positions; None: joints and TCP are not held together.
+        proof: Knows the robot; None: joints and TCP are not held together, joints may turn as
+            fast as is stated, and what the policy saw is not held against states.
     """
 
-    def __init__(self, forward: Forward | None = None) -> None:
-        self._forward = forward
+    def __init__(self, proof: MotionProof | None = None) -> None:
+        self._proof = proof
         self._timed = False
         self._states: dict[int, _State] = {}
+        self._arrived: list[int] = []
         self._last_ns = self._felt_ns = -1
         self._peak_n = 0.0
 
@@ -59,6 +65,8 @@ class Measured:
             return
         elif kind == "state":
             yield from self._state(m)
+        elif kind == "arrived":
+            insort(self._arrived, m["exposed_ns"])
         elif kind in ("exposure", "end"):
             if m["t"] != self._last_ns:
                 yield "state.missing", f"No state is stated at {m['t']} ns."
@@ -72,20 +80,24 @@ class Measured:
             yield from self._seen(m)
 
     def _state(self, m: Message) -> Iterator[Finding]:
-        state = _State(np.array(m["q_rad"]), np.array(m["tcp_m"]), float(m["force_n"]))
-        turned = np.array(m["tcp_rotation"])
-        numbers = [*state.q_rad, *state.tcp_m, *turned, m["gripper_m"], state.force_n]
-        if not all(map(math.isfinite, numbers)):
+        q_rad, tcp_m, turned = (
+            np.array(m[name], dtype=np.float64) for name in ("q_rad", "tcp_m", "tcp_rotation")
+        )
+        pose = np.array([*tcp_m, *turned, m["gripper_m"]])
+        state = _State(q_rad, pose, float(m["force_n"]))
+        if not all(map(math.isfinite, [*q_rad, *pose, state.force_n])):
             yield "state.number", "What is measured is no number."
             return
         if not m["t"] > self._last_ns:
             yield "state.again", f"At {m['t']} ns more is stated than once a tick."
+        elif self._proof is not None and self._states:
+            yield from self._turned(state, (m["t"] - self._last_ns) / 1e9)
         self._states[m["t"]], self._last_ns = state, m["t"]
         yield from self._felt(state.force_n)
-        if self._forward is not None:
-            position, rotation = self._forward(state.q_rad)
+        if self._proof is not None:
+            position, rotation = self._proof.forward(q_rad)
             off = max(
-                float(np.max(np.abs(position - state.tcp_m))),
+                float(np.max(np.abs(position - tcp_m))),
                 float(np.max(np.abs(rotation_to_6d(rotation) - turned))),
             )
             if not off <= POSE_TOLERANCE:
@@ -93,6 +105,13 @@ class Measured:
                     "state.pose",
                     f"The joints put the TCP elsewhere than is stated, by {off:.3g}.",
                 )
+
+    def _turned(self, state: _State, since_s: float) -> Iterator[Finding]:
+        """No joint turned faster since the state before than it can."""
+        assert self._proof is not None
+        turned = np.abs(state.q_rad - self._states[self._last_ns].q_rad)
+        if not np.all(turned <= self._proof.expected.arm_rates[0] * since_s + 2 * ROUNDING):
+            yield "state.speed", f"The joints turn by {turned.tolist()} rad in {since_s:.3g} s."
 
     def _felt(self, force_n: float) -> Iterator[Finding]:
         """No state is above the peak on record, and a new peak is the state of its tick."""
@@ -110,12 +129,22 @@ class Measured:
             )
 
     def _seen(self, m: Message) -> Iterator[Finding]:
-        """The observed position of the TCP is one of an observation's channels, side by side."""
-        state, seen = self._states.get(m["exposed_ns"]), floats(m["history"])
-        newest = seen[-(len(seen) // max(int(m["rows"]), 1)) :]
-        threes = np.lib.stride_tricks.sliding_window_view(np.pad(newest, 1), 3)
-        if state is None or not np.any(np.all(np.abs(threes - state.tcp_m) <= ROUNDING, axis=1)):
-            yield "state.seen", f"Invocation {m['id']!r} saw the TCP elsewhere than is stated."
+        """Each row of what was seen has TCP and opening of its tick; the first may be repeated."""
+        rows, seen = int(m["rows"]), self._arrived[-int(m["rows"]) :]
+        if not seen or seen[-1] != m["exposed_ns"]:
+            yield "state.seen", f"Invocation {m['id']!r} saw what is not the newest that is there."
+            return
+        pose_of = None if self._proof is None else self._proof.expected.seen
+        if pose_of is None:
+            return
+        history = floats(m["history"]).reshape(rows, -1)
+        for row, tick_ns in zip(history, [seen[0]] * (rows - len(seen)) + seen, strict=True):
+            state = self._states.get(tick_ns)
+            if state is None or not _same(state.pose, pose_of(row)):
+                yield (
+                    "state.seen",
+                    f"Invocation {m['id']!r} saw the TCP of {tick_ns} ns otherwise than stated.",
+                )
 
 
 def _same(stated: Array, measured: Array) -> bool:

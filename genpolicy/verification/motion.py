@@ -8,7 +8,7 @@ What may be done with a held object is `contact`'s.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
@@ -57,6 +57,8 @@ class ExpectedMotion:
         held_opening_m: Above this opening nothing is held.
         contact: What touching the target must keep to.
         projection: What may be made of a chunk before it is admitted.
+        seen: Pose of the TCP and opening, as an action (10,), that an observation (D_o,) shows;
+            None: what was seen is not held against what was measured.
     """
 
     scene_path: Path
@@ -72,6 +74,7 @@ class ExpectedMotion:
     held_opening_m: float
     contact: ExpectedContact
     projection: ExpectedProjection
+    seen: Callable[[Array], Array] | None = None
 
 
 class MotionProof:

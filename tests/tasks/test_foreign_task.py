@@ -237,7 +237,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         replan_lead_steps=cell.execution.replan_lead_steps,
         late_chunk=cell.execution.late_by_phase,
     )
-    motion = expected_motion(cell.checker.cell)
+    motion = expected_motion(cell.checker.cell, rollouts[0].setup.task.action_at)
     report = check_journal(journal, expected, motion)
     assert not report.violations and report.reproved_actions > 100
 

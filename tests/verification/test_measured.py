@@ -1,5 +1,7 @@
 """Measured states: a journal that is right, and one for each way to have measured otherwise."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,15 @@ from genpolicy.verification.measured import Measured
 MS = 1_000_000
 SESSION = ("session", {"t": 0, "labels": {"start_sha256": "ab"}})
 COLUMNS = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-SEEN = np.array([[9.0] * 5, [9.0, 0.1, 0.2, 0.3, 9.0]])
+POSE = [0.1, 0.2, 0.3, *COLUMNS, 0.01]
+SEEN = np.array([[9.0, *POSE]] * 2)
+RATES = np.array([2.0, 2.0, 2.0, 0.2])
 
 
-def arm(q_rad):
-    """An arm that stands upright, its TCP at the first three joints."""
-    return q_rad[:3], np.eye(3)
+def robot(seen=lambda row: row[1:]):
+    """An arm that stands upright, its TCP at the first three joints; the last turns slowly."""
+    expected = SimpleNamespace(arm_rates=np.stack([RATES, RATES]), seen=seen)
+    return SimpleNamespace(forward=lambda q_rad: (q_rad[:3], np.eye(3)), expected=expected)
 
 
 def state(t, **changes):
@@ -24,8 +29,17 @@ def state(t, **changes):
     return "state", {"t": t * MS, **payload, **changes}
 
 
+def at(t, x):
+    """A state with the arm moved along its first joint."""
+    return state(t, q_rad=[x, 0.2, 0.3, 0.4], tcp_m=[x, 0.2, 0.3])
+
+
 def exposed(t):
     return "exposure", {"t": t * MS}
+
+
+def there(t):
+    return "arrived", {"exposed_ns": t * MS}
 
 
 def saw(t, history=SEEN):
@@ -44,17 +58,23 @@ def felt(t, force_n):
 
 END = ("end", {"t": 100 * MS})
 TICKS = (state(0), exposed(0), state(50), exposed(50))
+BOTH = (*TICKS, there(0), there(50))
+MOVED = (at(0, 0.1), at(50, 0.2), there(0), there(50))
+SAW_MOVED = SEEN + np.array([[0.0] * 11, [0.0, 0.1, *[0.0] * 9]])
 
 
-def rules(*events, session=SESSION, forward=arm):
-    seen = Measured(forward)
+def rules(*events, session=SESSION, proof=None):
+    seen = Measured(proof or robot())
     return [rule for kind, m in (session, *events) for rule, _ in seen.follow(kind, m)]
 
 
 def test_a_state_at_every_tick_and_at_the_end():
-    assert rules(*TICKS, saw(50), queued(50), felt(100, 2.0), state(100, force_n=2.0), END) == []
+    assert rules(*BOTH, saw(50), queued(50), felt(100, 2.0), state(100, force_n=2.0), END) == []
     # Six decimals are what is stated.
-    assert rules(*TICKS, queued(50, (0.1 + 4e-7, 0.2, 0.3, 0.4)), saw(0, SEEN + 4e-7)) == []
+    assert rules(*BOTH, queued(50, (0.1 + 4e-7, 0.2, 0.3, 0.4)), saw(50, SEEN + 4e-7)) == []
+    assert rules(*TICKS, there(0), saw(0)) == []  # the first is repeated
+    assert rules(*MOVED, saw(50, SAW_MOVED)) == []  # by 0.1 rad in 50 ms, as fast as it can
+    assert rules(*TICKS, there(50), there(0), saw(50)) == []  # an older one came later
     assert rules(*TICKS, felt(100, 2.0), state(100, force_n=2.0), state(150, force_n=1.0)) == []
     fallback = ("enqueue", {"chunk_id": "a", "motion": None})  # a violation of its own
     assert rules(*TICKS, fallback) == []
@@ -72,9 +92,16 @@ def test_a_state_at_every_tick_and_at_the_end():
         ((*TICKS, queued(50, (0.1, 0.2, 0.3, 0.41))), "state.joints"),
         ((*TICKS, queued(50, (0.1, 0.2, 0.3))), "state.joints"),
         ((*TICKS, queued(60)), "state.joints"),
-        ((*TICKS, saw(50, SEEN + 1e-5)), "state.seen"),
-        ((*TICKS, saw(50, SEEN[::-1])), "state.seen"),  # an older row is not the newest
-        ((*TICKS, saw(60)), "state.seen"),
+        ((*BOTH, saw(50, SEEN + np.array([[0.0], [1e-5]]))), "state.seen"),
+        ((*BOTH, saw(50, SEEN + np.eye(2, 11, 10) * 1e-5)), "state.seen"),
+        ((*BOTH, saw(50, np.roll(SEEN, 3, axis=1)[-1:])), "state.seen"),  # in another channel
+        ((*MOVED, saw(50, SAW_MOVED[::-1])), "state.seen"),  # an older row is not the newest
+        ((*MOVED, saw(50, SAW_MOVED[[1, 1]])), "state.seen"),  # nor is the newest an older one
+        ((*TICKS, there(0), there(60), saw(60, SEEN)), "state.seen"),
+        ((*BOTH, saw(0)), "state.seen"),
+        ((*TICKS, saw(50)), "state.seen"),
+        ((at(0, 0.1), at(50, 0.2001)), "state.speed"),
+        ((state(0), state(50, q_rad=[0.1, 0.2, 0.3, 0.389])), "state.speed"),
         ((*TICKS, state(100, force_n=2.0)), "state.force"),
         ((*TICKS, felt(100, 2.0), state(100, force_n=1.0)), "state.force"),
         ((*TICKS, state(100), felt(100, 2.0)), "state.force"),
@@ -83,7 +110,7 @@ def test_a_state_at_every_tick_and_at_the_end():
     ],
 )
 def test_what_was_not_measured_so_is_found(events, rule):
-    assert rules(*events) == [rule]
+    assert set(rules(*events)) == {rule}
 
 
 def test_a_session_without_a_virtual_clock_is_not_asked():
@@ -91,4 +118,11 @@ def test_a_session_without_a_virtual_clock_is_not_asked():
 
 
 def test_without_a_robot_joints_and_tcp_are_not_held_together():
-    assert rules(*TICKS, state(100, tcp_m=[0.0, 0.0, 0.0]), END, forward=None) == []
+    seen = Measured()
+    elsewhere = state(100, tcp_m=[0.0, 0.0, 0.0], q_rad=[9.0] * 4)
+    events = (SESSION, *BOTH, elsewhere, END, saw(50, SEEN + 1.0))
+    assert [one for kind, m in events for one in seen.follow(kind, m)] == []
+
+
+def test_who_does_not_say_where_the_tcp_is_seen_is_not_asked():
+    assert rules(*BOTH, saw(50, SEEN + 1.0), proof=robot(seen=None)) == []

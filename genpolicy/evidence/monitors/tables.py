@@ -78,7 +78,8 @@ def write_monitors(
         action_period_s=comparison.cell.horizons.action_period_s,
     )
     journals = [shard.journal for shard in (*thresholds, *shards)]
-    CHECKER.write(folder, checker_document(journals, cell=comparison.cell, robot=robot))
+    checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
+    CHECKER.write(folder, checked)
 
 
 def write_unwatched(folder: Path) -> None:

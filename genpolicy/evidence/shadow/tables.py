@@ -1,8 +1,11 @@
 """The shadow evidence as files: candidates, stub, balances, holds, journal, checker and others."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.evidence.documents.gallery import GALLERY, Gallery
 from genpolicy.evidence.documents.shadow import (
@@ -34,6 +37,8 @@ from genpolicy.integrity.rows import write_rows
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.report import JournalReport
+
+Array = NDArray[np.float64]
 
 
 def write_shadow(
@@ -102,11 +107,24 @@ def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
     return [{**totals, "reason": reason, "count": count} for reason, count in reasons]
 
 
-def checker_document(journals: Sequence[Path], *, cell: Cell, robot: FeasibilityCell) -> Checked:
+def checker_document(
+    journals: Sequence[Path],
+    *,
+    cell: Cell,
+    robot: FeasibilityCell,
+    seen: Callable[[Array], Array] | None = None,
+) -> Checked:
     """What the independent checker says of journal files; content of `checker.json`.
 
     The settings that every session must have run under come from `params.yaml`, not from the
     journal.
+
+    Args:
+        journals: The files.
+        cell: The settings.
+        robot: What actions were checked in.
+        seen: The task's `action_at`, where sessions are on the virtual clock and state what was
+            measured.
     """
     horizons, execution = cell.horizons, cell.execution
     expected = ExpectedSettings(
@@ -119,7 +137,7 @@ def checker_document(journals: Sequence[Path], *, cell: Cell, robot: Feasibility
         replan_lead_steps=execution.replan_lead_steps,
         late_chunk=execution.late_by_phase,
     )
-    motion = expected_motion(robot)
+    motion = expected_motion(robot, seen)
     return checked(
         {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     )

@@ -100,12 +100,14 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]
     comparison = shards[0].comparison
+    task = load_task(comparison.task)
     robot = cell_of(
-        load_task(comparison.task),
+        task,
         comparison.feasibility,
         action_period_s=comparison.cell.horizons.action_period_s,
     )
-    CHECKER.write(folder, checker_document(journals, cell=comparison.cell, robot=robot))
+    checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
+    CHECKER.write(folder, checked)
     _write_envelope(folder, shards)
     write_distilled(folder, [shard.judged for shard in shards])
 

@@ -132,8 +132,9 @@ def check(rollouts, folder, *, execution=EXECUTION):
         replan_lead_steps=execution.replan_lead_steps,
         late_chunk=execution.late_by_phase,
     )
-    robot = rollouts[0].setup.checker.cell if rollouts else None
-    return check_journal(path, expected, robot and expected_motion(robot))
+    setup = rollouts[0].setup if rollouts else None
+    motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
+    return check_journal(path, expected, motion)
 
 
 @pytest.fixture(scope="session")
