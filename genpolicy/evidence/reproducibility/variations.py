@@ -16,7 +16,9 @@ import torch
 from numpy.typing import NDArray
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.kinds import HostedEntry, ProgramEntry
 from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.wire.entry import Entry
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.action import ACTION_COMPONENTS
 from genpolicy.contract.horizons import HorizonConfig
@@ -38,7 +40,7 @@ from genpolicy.seeds import stream
 Array = NDArray[np.float64]
 
 OTHER_THREADS = 2
-"""Threads of a process in which fixtures are asked for again; every fixture has one."""
+"""Threads of a process in which fixtures are asked for again; one, where it declares as many."""
 COMPANY = 2 * CANDIDATES
 """Candidates that are drawn at once where a sample stands beside others than usually."""
 ORDER_SEED = 0
@@ -165,21 +167,30 @@ def wire_otherwise(
     if np.isnan(first).all():
         return Varied({}, dict.fromkeys(VARIATIONS, "it answered no question"))
     started = brought.entry.started_here
-    threads = OTHER_THREADS if started else None
+    threads = _others(brought.entry) if started else None
     with running(brought, contract, scene=scene, threads=threads) as policy:
         plain = plainly(policy, observations)
         varied = asked_otherwise(policy, observations, plain=plain)
         told = policy.told
     if not started:
         varied = Varied(varied.pairs, {THREADS: "it runs already: who started it says how many"})
-    else:
+    elif isinstance(brought.entry, ProgramEntry) or not np.array_equal(plain, first):
         varied = with_threads(varied, plain, plain=first)
+    else:  # what differs has been seen; what does not may not have obeyed
+        varied = Varied(varied.pairs, {THREADS: "told, and may not obey; nothing differed"})
     if not policy.stochastic:
         return varied.without(ALONE, TOGETHER, why="it draws one chunk a message, always the same")
     at_most = f"its server draws {told.candidates} of the chunks in a message at most"
     if told.candidates < CANDIDATES:
         return varied.without(ALONE, TOGETHER, why=at_most)
     return varied if told.candidates >= COMPANY else varied.without(TOGETHER, why=at_most)
+
+
+def _others(entry: Entry) -> int:
+    """Another number of threads than an entry says that it has."""
+    said = entry if isinstance(entry, HostedEntry) else entry.declared
+    own = 1 if said is None else said.threads
+    return 1 if own == OTHER_THREADS else OTHER_THREADS
 
 
 @contextmanager

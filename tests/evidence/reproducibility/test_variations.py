@@ -13,7 +13,7 @@ import torch
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.judged import trained
-from genpolicy.candidates.wire.policy import THREAD_VARIABLES
+from genpolicy.candidates.wire.policy import THREAD_VARIABLES, running
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.contract.action import ACTION_COMPONENTS
 from genpolicy.evidence.reproducibility import variations
@@ -197,18 +197,39 @@ def plan(given):
 """
 
 
-def test_another_start_has_other_threads_and_is_held_against_the_first(
-    written,  # noqa: F811
-    task,
-    seen,
-    tmp_path,
-):
-    path = written("scripted", files={"planner.py": sha256_bytes(PLANNER.encode())})
-    (tmp_path / "planner.py").write_text(PLANNER)
+@pytest.fixture
+def planned(written, task, seen, tmp_path):  # noqa: F811
+    """Ways of a planner whose code is given, against what its first start answered."""
+
+    def ask(code, own, **changes):
+        path = written(
+            "scripted", files={"planner.py": sha256_bytes(code.encode())}, declared=None, **changes
+        )
+        (tmp_path / "planner.py").write_text(code)
+        entry = read_entry(path)
+        brought = BroughtPolicy("planted", path, entry, entry.sha256, 0)
+        own = np.full((len(seen), CANDIDATES, 16, 10), float(own))
+        return wire_otherwise(brought, task.observation, seen, own, scene=task.scene_path)
+
+    return ask
+
+
+@pytest.mark.parametrize(("declared", "other"), [(1, OTHER_THREADS), (2, 1), (4, OTHER_THREADS)])
+def test_another_start_has_other_threads_and_is_held_against_the_first(planned, declared, other):
+    own = len(THREAD_VARIABLES) * declared
+    found = planned(PLANNER, own, threads=declared)
+    drawn, plain = found.pairs[THREADS]
+    assert (drawn == len(THREAD_VARIABLES) * other).all() and (plain == own).all()
+    assert red(found) == {THREADS} and set(found.unknown) == {ALONE, TOGETHER}
+
+
+def test_who_may_not_have_obeyed_is_unknown_and_a_program_is_not(planned, written, task, seen):  # noqa: F811
+    found = planned("import numpy as np\ndef plan(given):\n    return np.ones((16, 10))", 1)
+    assert found.unknown[THREADS] == "told, and may not obey; nothing differed"
+    path = written("torch")
     entry = read_entry(path)
     brought = BroughtPolicy("planted", path, entry, entry.sha256, 0)
-    own = np.full((len(seen), CANDIDATES, 16, 10), float(len(THREAD_VARIABLES)))
+    with running(brought, task.observation, scene=task.scene_path) as policy:
+        own = variations.plainly(policy, seen)
     found = wire_otherwise(brought, task.observation, seen, own, scene=task.scene_path)
-    drawn, plain = found.pairs[THREADS]
-    assert (drawn == len(THREAD_VARIABLES) * OTHER_THREADS).all() and (plain == own).all()
-    assert red(found) == {THREADS} and set(found.unknown) == {ALONE, TOGETHER}
+    assert THREADS in found.pairs and THREADS not in found.unknown

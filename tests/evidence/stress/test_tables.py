@@ -334,4 +334,4 @@ def test_a_distilled_policy_s_teacher_and_what_it_took_stand_beside_the_comparis
     found = DISTILLED.read(tmp_path / "stress")
     assert set(found) == {"manicm"}
     assert found["manicm"].teacher_sha256 == hashes["diffusion"][0]
-    assert found["manicm"].updates == 2 * short.steps
+    assert found["manicm"].updates == 2 * short.updates
