@@ -7,9 +7,10 @@ from types import SimpleNamespace
 from typing import Any
 
 from gates.stated import Row, compare_rows, training_seed
+from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.stress.worth import kept_whole
-from genpolicy.integrity.tables import read_table
+from genpolicy.integrity.rows import read_columns
 from genpolicy.verification.refused import KEYS, RefusedCandidates, Rollout
 
 TABLE = "artifacts/stress/refused.parquet"
@@ -33,10 +34,10 @@ def rederive_refused(
 
     Raises:
         RefusedError: A chunk is another one than was judged, is missing, or is too many.
-        IntegrityError: The table is missing or no regular file.
+        IntegrityError: The table is no regular file, or has not the columns of its row.
         BadInputError: It cannot be read.
     """
-    stated = [_hashed(row) for row in read_table(root / TABLE).to_pylist()]
+    stated = [_hashed(row) for row in read_columns(root / TABLE, RefusedRow).to_pylist()]
     derived = list(refused.rows(_kept(rollouts)))
     compare_rows("D", TABLE, KEYS, stated, derived, seed=training_seed(params))
 

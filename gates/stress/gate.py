@@ -21,7 +21,7 @@ from gates.stress.contact import contact_said
 from gates.stress.gains import by_condition, inside_envelope, least_gain
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
-from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
+from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
 
 
 @criterion(
@@ -93,7 +93,7 @@ GATE = GateSpec(
     gate="D",
     settings=StressSettings,
     criteria=criteria_of(vars(trial), vars(cost), vars(safety), globals()),
-    bind=(JOURNALS, PREREGISTRATION, OVERRIDES),
+    bind=(JOURNALS, REFUSED, PREREGISTRATION, OVERRIDES),
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(

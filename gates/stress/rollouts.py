@@ -17,6 +17,7 @@ from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
 JOURNALS = f"{STRESS}/journals/*.mcap"
+REFUSED = f"{STRESS}/refused.parquet"
 INVOCATIONS = f"{STRESS}/invocations.parquet"
 FAULTS = f"{STRESS}/faults.parquet"
 """Missing where no policy in a process of its own was compared."""

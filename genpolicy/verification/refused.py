@@ -19,20 +19,29 @@ class RefusedCandidates:
     _rows: list[dict[str, Any]] = field(default_factory=list)
 
     def read(self, kind: str, m: Message) -> None:
-        """Take an event in."""
+        """Take an event in.
+
+        Raises:
+            ValueError: A candidate that a layer refused has no reason, or one that passed has.
+        """
         if kind == "session":
             labels = m["labels"]
             self._of[m["session"]] = (
                 str(labels.get("method")), str(labels.get("perturbation")),
                 int(labels.get("start", -1)),
             )  # fmt: skip
-        elif kind == "candidate" and m["first_reason"]:
+        elif kind == "candidate":
+            refusing = [name for name, ok in m["layers"].items() if ok is not True]
+            if bool(refusing) != bool(m["first_reason"]):
+                raise ValueError(f"{m['chunk_id']!r}: layers and reason contradict each other")
+            if not refusing:
+                return
             method, perturbation, start = self._of[m["session"]]
             self._rows.append(
                 {
                     "method": method, "perturbation": perturbation, "start": start,
                     "chunk_id": m["chunk_id"], "candidate": m["index"],
-                    "layer": next(name for name, ok in m["layers"].items() if ok is not True),
+                    "layer": refusing[0],
                     "first_reason": m["first_reason"],
                     "raw_sha256": m["measures"]["raw_sha256"],
                     "projected_sha256": m["measures"]["projected_sha256"],

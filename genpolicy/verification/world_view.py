@@ -35,6 +35,7 @@ class WorldView:
         self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
             "observation": self._observe, "mode": self._change_mode, "reset": self._reset,
             "supervisor": self._supervise, "controller": self._change_controller,
+            "candidate": self._judge,
         }  # fmt: skip
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
@@ -90,6 +91,17 @@ class WorldView:
         for cause, before_ns in self.void_before.items():
             if seen_ns < before_ns:
                 yield "P1.void", f"{cause} at {before_ns} ns voids an observation of {seen_ns} ns."
+
+    @staticmethod
+    def _judge(m: Message) -> Iterator[Finding]:
+        """A candidate is refused where a layer is not passed, and then has a reason."""
+        passed = bool(m["layers"]) and all(ok is True for ok in m["layers"].values())
+        if passed == bool(m["first_reason"]):
+            yield (
+                "journal.verdict",
+                f"{m['chunk_id']!r} has the layers {m['layers']} and the reason "
+                f"{m['first_reason']!r}.",
+            )
 
     def _change_mode(self, m: Message) -> Iterator[Finding]:
         if m["old"] != self.mode:

@@ -7,10 +7,11 @@ import pytest
 import yaml
 
 from gates.rederive_refused import TABLE, rederive_refused
-from genpolicy.errors import RefusedError
+from genpolicy.errors import IntegrityError, RefusedError
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
-from genpolicy.integrity.rows import write_rows
+from genpolicy.integrity.rows import table_of_rows, write_rows
+from genpolicy.integrity.tables import write_table
 from genpolicy.verification.refused import RefusedCandidates
 
 PARAMS = {"policy": {"seeds": [0]}}
@@ -19,7 +20,7 @@ RAW, PROJECTED = (0.0, 1.0), (0.5, 1.0)
 
 def candidate(index, first_reason="collision"):
     measures = {"raw_sha256": numbers_sha256(RAW), "projected_sha256": numbers_sha256(PROJECTED)}
-    layers = {"representation": True, "kinematic": True, "geometric": False, "dynamic": None}
+    layers = {"representation": True, "kinematic": True, "geometric": not first_reason}
     return {
         "session": "flow/push/0", "chunk_id": "c", "index": index, "layers": layers,
         "first_reason": first_reason, "measures": measures if first_reason else {},
@@ -65,6 +66,15 @@ UNWATCHED = [rollout(n, "success", float(n)) for n in range(3)]
 def test_what_was_judged_stands(tmp_path):
     proved(tmp_path, [row(0), row(1)], LOST)
     proved(tmp_path, [], UNWATCHED)
+
+
+def test_a_table_without_a_column_is_refused_by_name(tmp_path, monkeypatch):
+    def lacking(path, row, rows):
+        write_table(path, table_of_rows(row, rows).drop_columns(["raw"]))
+
+    monkeypatch.setitem(globals(), "write_rows", lacking)
+    with pytest.raises(IntegrityError, match="raw"):
+        proved(tmp_path, [row(0), row(1)], LOST)
 
 
 @pytest.mark.parametrize(

@@ -125,3 +125,20 @@ def test_another_mode_of_the_controller_objects_and_voids_what_was_seen_before(v
     ((rule, _),) = view.follow("controller", {"mode": None, "t": 1170 * MS})
     assert rule == "journal.controller"
     assert "P1.controller" in rules(WorldView())
+
+
+@pytest.mark.parametrize(
+    ("layers", "reason", "found"),
+    [
+        ({"a": True, "b": True}, None, []),
+        ({"a": True, "b": False}, "collision", []),
+        ({"a": None}, "no_model", []),
+        ({"a": True, "b": False}, None, ["journal.verdict"]),
+        ({"a": True, "b": None}, "", ["journal.verdict"]),
+        ({"a": True, "b": True}, "collision", ["journal.verdict"]),
+        ({}, None, ["journal.verdict"]),
+    ],
+)
+def test_layers_and_reason_of_a_verdict_agree(view, layers, reason, found):
+    m = {"t": 0, "chunk_id": "c", "layers": layers, "first_reason": reason}
+    assert [rule for rule, _ in view.follow("candidate", m)] == found
