@@ -39,6 +39,9 @@ class Terms:
             yield from self._stated(m)
         elif kind == "conditioning":
             yield from self._on_its_way(m)
+        elif kind == "end":
+            for name in sorted(self._begun_s.keys() - self._of.keys()):
+                yield "clock.terms", f"Invocation {name!r} never says what it takes its time for."
 
     def _stated(self, m: Message) -> Iterator[Finding]:
         which, terms = f"Invocation {m['id']!r}", {name: float(m[name]) for name in TERMS}

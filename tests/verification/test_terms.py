@@ -10,6 +10,7 @@ MS = 1_000_000
 BEGIN = ("invocation", {"t": 104 * MS, "id": "a", "stage": "begin", "detail": "0.011"})
 STATED = ("latency", {"t": 104 * MS, "id": "a", **dict.fromkeys(TERMS, 0.001)})
 SAW = ("conditioning", {"t": 104 * MS, "id": "a", "exposed_ns": 100 * MS})
+END = ("end", {"t": 200 * MS})
 THERE = ("arrived", {"t": 104 * MS, "exposed_ns": 100 * MS})
 
 
@@ -25,7 +26,7 @@ def changed(event, **to):
 def test_eleven_terms_that_sum_to_the_whole():
     assert [*TERMS] == [f"{term}_s" for term in Term]
     assert [*SENSED] == [f"{term}_s" for term in SENSOR_TERMS]
-    assert rules(THERE, BEGIN, STATED, SAW) == []
+    assert rules(THERE, BEGIN, STATED, SAW, END) == []
     # Beyond the sensors a second may move from one term to another: that is asked of `owed`.
     assert rules(THERE, BEGIN, changed(STATED, encode_s=0.0, sample_s=0.002), SAW) == []
 
@@ -39,6 +40,8 @@ def test_eleven_terms_that_sum_to_the_whole():
         (THERE, BEGIN, changed(STATED, sample_s=float("inf")), SAW),
         (THERE, BEGIN, changed(STATED, capture_s=0.0, sample_s=0.002), SAW),
         (THERE, BEGIN, SAW),
+        (THERE, BEGIN, END),
+        (THERE, BEGIN, STATED, SAW, changed(BEGIN, id="b"), END),
         (THERE, STATED, BEGIN, SAW),
         (THERE, BEGIN, STATED, changed(STATED, sample_s=0.001), SAW),
         (THERE, BEGIN, changed(STATED, id="b"), SAW),
