@@ -96,7 +96,7 @@ class _Picture:
         self._views = views_of(workspace, width=WIDTH * FINER, gap=GAP * FINER)
         self._top = LINE * FINER
         self._strips = (
-            Strip("force, each new peak, N", film.forces, 10.0),
+            Strip("force, N", film.forces, 10.0),
             Strip("age of what conditioned the action, s", film.ages, 0.1),
         )
         self._below = self._top + max(view.height for view in self._views)
