@@ -127,6 +127,7 @@ class Rollout:
         """Observe, supervise, and collect what has been delivered by now."""
         now_s, world = self.now_s, self.world
         self._seen = observation = world.observe()
+        self.tally.feel(self.journal, now_s, world.contact_force_n)  # new at the start only
         self._measured.note(now_s, observation)
         self.journal.scene(now_s, self.setup.task.scene_poses(observation))
         position, _ = world.tcp_pose

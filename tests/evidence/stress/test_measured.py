@@ -109,3 +109,12 @@ def test_six_decimals_and_no_negative_zero():
     """By hand."""
     assert rounded(np.array([[0.1234567, -1e-9], [1.0, -2.5]])) == [0.123457, 0.0, 1.0, -2.5]
     assert str(rounded(np.array([-0.0]))[0]) == "0.0"
+
+
+def test_a_force_that_is_there_at_the_start_is_its_first_peak(run, plans, kit, monkeypatch):
+    world = type(run(kit.Replay(plans.actions), ticks=1)[0].world)
+    monkeypatch.setattr(world, "contact_force_n", property(lambda self: 2.0))
+    (rollout,) = run(kit.Replay(plans.actions), ticks=3)
+    assert [event.payload for event in of_kind(rollout, "force")] == [{"force_n": 2.0}]
+    kinds = [event.kind for event in rollout.journal.events()]
+    assert kinds.index("force") < kinds.index("state")
