@@ -21,6 +21,7 @@ from gates.reproducibility.settings import (
     DENSITY,
     GENERATORS,
     RELOAD,
+    SAMPLES,
     ReproducibilitySettings,
 )
 from genpolicy.evidence.documents.brought import BROUGHT, FAULTS, Brought
@@ -219,7 +220,7 @@ def samples_difference(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Largest difference of a sample after reload, in its own unit."""
-    rows = evidence.of(f"{RELOAD}/samples.parquet", SampleRow, candidate)
+    rows = evidence.of(SAMPLES, SampleRow, candidate)
     largest = float(np.abs(numbers(rows, "max_abs_difference")).max())
     unequal = int((rows["sha256_trained"] != rows["sha256_reloaded"]).sum())
     if unequal and largest == 0.0:

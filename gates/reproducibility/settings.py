@@ -11,9 +11,10 @@ from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.may_differ import PLACE, Listed
 from gates.report import Owner, StrictModel, parse_section, stage_of
 from gates.settings import CandidateSettings, section_of
-from genpolicy.evidence.rows.reproducibility import NfeRow
+from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
 RELOAD = "artifacts/reload"
+SAMPLES = f"{RELOAD}/samples.parquet"
 COVERAGE = f"{RELOAD}/coverage.parquet"
 MODES = f"{RELOAD}/modes.parquet"
 MODES_EARLIER = f"{RELOAD}/modes_earlier.parquet"
@@ -123,6 +124,13 @@ def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     if lowest != highest:
         raise MissingEvidenceError(f"{candidate} records several NFE: {lowest:g} to {highest:g}")
     return lowest, highest
+
+
+def fixtures_of(evidence: Evidence, candidate: str) -> dict[int, int]:
+    """How many fixtures of each training seed a candidate was asked for."""
+    rows = evidence.of(SAMPLES, SampleRow, candidate)
+    counted = rows.groupby("seed")["row"].nunique()
+    return dict(zip(counted.index.tolist(), counted.tolist(), strict=True))
 
 
 def excepted_until(params: Mapping[str, Any], candidate: str) -> str:

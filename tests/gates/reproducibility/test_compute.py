@@ -1,6 +1,9 @@
 """What a network and its training cost stands in the report; a count that contradicts is named."""
 
+from types import SimpleNamespace
+
 import evidence
+import pandas as pd
 import pytest
 from asked import asked
 from editing import cells
@@ -10,8 +13,9 @@ from gates.pages.figures import draw_all
 from gates.pages.page import gate_page
 from gates.pages.tables_compute import LISTING, NOT_COUNTED
 from gates.proof import judge
-from gates.reproducibility.compute import COMPUTE
+from gates.reproducibility.compute import COMPUTE, Cost, miscounted
 from gates.reproducibility.gate import parameter_budget_deviation, unpinned_items
+from genpolicy.evidence.rows.reproducibility import PARTS
 from genpolicy.policies.settings import TrainingConfig
 
 TABLE = COMPUTE.removeprefix("artifacts/")
@@ -38,7 +42,10 @@ def test_the_report_says_parts_rule_and_operations(ladder):
 @pytest.mark.parametrize(
     ("part", "column", "value", "said"),
     [("trunk", "parameters", 81, "parameters of trunk: counted 81, trained as 80"),
-     ("head", "operations", 0, "operations of head: counted 0, trained as 1")],
+     ("head", "operations", 0, "operations of head: counted 0, trained as 1"),
+     ("trunk", "operations", 0, "operations of trunk: counted 0, trained as 1"),
+     ("head", "operations", 5, "operations of head: counted 5, trained as 1"),
+     ("encoder", "operations", 5, "operations of encoder: counted 5, trained as 1")],
 )  # fmt: skip
 def test_a_count_that_training_did_not_write_is_not_pinned(ladder, part, column, value, said):
     edit(ladder, part, column, value)
@@ -49,6 +56,26 @@ def test_a_count_that_training_did_not_write_is_not_pinned(ladder, part, column,
 def test_products_outside_of_layers_contradict_nothing(ladder):
     edit(ladder, "trunk", "operations", 5)
     assert asked(ladder, unpinned_items, "flow", gate="B").value == 0.0
+
+
+def test_a_part_that_training_does_not_name_is_not_pinned(ladder):
+    cost = Cost(dict.fromkeys(PARTS, 1), dict.fromkeys(PARTS, 0), 0, 9, 1, 1)
+    config = SimpleNamespace(
+        parameters=dict.fromkeys(PARTS, 1), training_only_parameters=0, flops={"head": 0}
+    )
+    assert miscounted(cost, config) == [
+        "operations of encoder: counted 0, trained as None",
+        "operations of trunk: counted 0, trained as None",
+    ]
+
+
+def test_a_training_seed_that_nobody_counted_is_missing(ladder):
+    def further(frame):
+        return pd.concat([frame, frame[frame["method"] == "flow"].assign(seed=1)])
+
+    evidence.edit_table(ladder, "reload/samples.parquet", further)
+    with pytest.raises(MissingEvidenceError, match="does not count encoder of flow once"):
+        asked(ladder, unpinned_items, "flow", gate="B")
 
 
 @pytest.mark.parametrize("part", ["encoder", "update"])
