@@ -150,8 +150,8 @@ def _ask_again(
             refuse("B", f"{ANSWERS}: {wire.method}", f"{len(first)} answers of a server",
                    f"one that starts ({wire.remote})")  # fmt: skip
         return
-    told = (wire.told.seeded, wire.told.counts_evaluations)
-    if told != (stated.seeded, stated.counts_evaluations):
+    told = (wire.told.seeded, wire.told.counts_evaluations, wire.told.candidates)
+    if told != (stated.seeded, stated.counts_evaluations, stated.most_candidates):
         refuse("B", f"{DOCUMENT}: {wire.method}", "other things that its server can", str(told))
     generator = stream(0, "asked again", wire.method, sha256_file(root / ANSWERS))
     apart = [row for row in first if row.moment < starts.apart]

@@ -42,7 +42,7 @@ LISTING = Listing(
     "`alone`, one observation and one candidate a call; `together`, twice as many candidates at "
     "once; `order`, the observations in another order. Largest differences, in the unit of the "
     "component. What is trained here takes one thread whatever its process has; a program that was "
-    "brought obeys, and a server is told and may not.",
+    "brought obeys, and anybody else is told and may not: unknown, where nothing differs.",
     VARIED,
     _varied,
 )

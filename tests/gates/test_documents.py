@@ -40,13 +40,14 @@ def root(tmp_path_factory, _ladder):
     # Nobody is brought to that ladder, and of nobody no key can be left out.
     somebody = {
         "author": "a@example.org", "sha256": "a" * 64, "files": {"weights": "b" * 64},
-        "program": {}, "started_here": True, "dataset": "c" * 64, "training_seed": 1,
+        "kind": "server", "stochastic": True, "program": {}, "started_here": True,
+        "dataset": "c" * 64, "training_seed": 1,
     }  # fmt: skip
     path = copied / "artifacts/candidates/candidates.json"
     path.write_bytes(canonical_json({"flow": somebody}))
     found = {
         "episodes": 35, "moments": 175, "candidates": 4, "observations_sha256": "d" * 64,
-        "seeded": True, "counts_evaluations": True,
+        "seeded": True, "counts_evaluations": True, "most_candidates": 4,
         "findings": [{"name": "answers", "judged": "holds", "gate": "B", "said": "35 of 35"}],
     }  # fmt: skip
     (copied / "artifacts/reload/conformance.json").write_bytes(canonical_json({"flow": found}))

@@ -210,7 +210,7 @@ def test_what_its_server_can_is_held_against_it(workspace):
     )
     refused(workspace, r"planted: evaluations is")
     judged(workspace, "evaluations", "unknown")
-    refused(workspace, r"planted is other things that its server can, required \(True, True\)")
+    refused(workspace, r"planted is other things that its server can, required \(True, True, \d+\)")
 
 
 def test_findings_of_somebody_who_was_not_brought_are_refused(workspace):

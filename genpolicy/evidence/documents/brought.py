@@ -13,21 +13,25 @@ class Brought:
     """A policy that was not trained here.
 
     Attributes:
+        kind: How it is hosted.
         author: Who made it, as an e-mail address; may not review it.
         sha256: Of what its entry says.
         files: What it is: SHA-256 of each file, by path from the entry's folder.
         program: What runs it beside them: SHA-256 of the adapter, or of each file that its command
             names from that folder.
         started_here: Whether the ladder starts its server; else somebody else does.
+        stochastic: Whether its candidates differ; else one is drawn.
         dataset: SHA-256 of the manifest of the dataset that it was trained on; empty if unsaid.
         training_seed: Root seed of its training; None if unsaid.
     """
 
+    kind: str
     author: str
     sha256: str
     files: dict[str, str]
     program: dict[str, str]
     started_here: bool
+    stochastic: bool
     dataset: str
     training_seed: int | None
 
@@ -59,11 +63,13 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
     """What the stage writes of the policies that were brought."""
     return {
         policy.name: Brought(
+            kind=policy.entry.kind,
             author=policy.entry.author,
             sha256=policy.sha256,
             files=dict(policy.entry.files),
             program=program_files(policy.entry, policy.folder),
             started_here=policy.entry.started_here,
+            stochastic=policy.entry.stochastic,
             dataset=policy.entry.declared.dataset if policy.entry.declared else "",
             training_seed=policy.entry.declared.training_seed if policy.entry.declared else None,
         )

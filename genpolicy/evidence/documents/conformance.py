@@ -17,6 +17,7 @@ class Conformance:
         observations_sha256: Of what it was shown at the moments that it was asked twice.
         seeded: Whether its server says that equal names of noise give equal chunks.
         counts_evaluations: Whether it says that it counts network evaluations.
+        most_candidates: Most chunks that it says it draws in one message.
         findings: What follows from its answers.
     """
 
@@ -26,6 +27,7 @@ class Conformance:
     observations_sha256: str
     seeded: bool
     counts_evaluations: bool
+    most_candidates: Count
     findings: list[Finding]
 
 

@@ -88,6 +88,7 @@ def conformance_of(
         observations_sha256=asked.observations_sha256,
         seeded=told.seeded,
         counts_evaluations=told.counts_evaluations,
+        most_candidates=told.candidates,
         findings=findings_of(starts, Answered(session.first, session.again, anew), told),
     )
 

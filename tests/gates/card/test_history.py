@@ -475,6 +475,7 @@ def test_who_made_a_policy_that_was_brought_is_an_author_of_the_card(history, pe
     root, _ = history
     entry = Brought(
         author="Rita@example.org", sha256="a" * 64, files={}, program={}, started_here=True,
+        kind="server", stochastic=True,
         dataset="", training_seed=None,
     )  # fmt: skip
     require_author_of_brought(root, "flow", ["ada"], people)  # nobody was brought

@@ -18,13 +18,13 @@ FINDINGS = [
 ]
 ANSWERED = {
     "episodes": 40, "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
-    "counts_evaluations": True, "findings": FINDINGS,
+    "counts_evaluations": True, "most_candidates": 4, "findings": FINDINGS,
 }  # fmt: skip
 EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}
 ENTRY = "own/flow.yaml"
 
 
-def bring(root, *, unmatched, change=None, document=None, findings=None):
+def bring(root, *, unmatched, change=None, document=None, findings=None, told=None):
     """Let `flow` be brought: no training of it is left, and its entry is in the evidence."""
 
     def params(found):
@@ -45,12 +45,13 @@ def bring(root, *, unmatched, change=None, document=None, findings=None):
     )
     pinned = {
         "author": "author@example.org", "sha256": identity["checkpoint"],
-        "files": {"weights.bin": "a" * 64}, "program": {}, "started_here": True,
+        "files": {"weights.bin": "a" * 64}, "program": {},
+        "kind": "torch", "stochastic": True, "started_here": True,
         "dataset": identity["dataset"],
         "training_seed": identity["seed"][0],
     }  # fmt: skip
     evidence.document(root, "candidates/candidates.json", {"flow": {**pinned, **(document or {})}})
-    said = {**ANSWERED, "findings": FINDINGS if findings is None else findings}
+    said = {**ANSWERED, "findings": FINDINGS if findings is None else findings, **(told or {})}
     evidence.document(root, "reload/conformance.json", {"flow": said})
     evidence.edit_document(
         root, "reload/identity.json",
