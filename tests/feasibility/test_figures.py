@@ -45,3 +45,8 @@ def test_a_stricter_cell_gives_stricter_figures(cell):
     found = expected_motion(replace(cell, settings=settings))
     assert np.allclose(found.rates[0], 0.5 * cell.limits.velocity_rad_s)
     assert found.tcp_speed_m_s == 0.1
+
+
+def test_what_observations_show_is_asked_of_whoever_calls(cell):
+    assert expected_motion(cell).seen is None
+    assert expected_motion(cell, np.negative).seen is np.negative

@@ -8,6 +8,10 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
 from gates.stress.gate import best_baseline, promotion_e_value
 from gates.stress.pairs import paired_differences
+from gates.stress.rollouts import REFUSED
+from genpolicy.evidence.rows.stress import RefusedRow
+from genpolicy.integrity.hashing import sha256_file
+from genpolicy.integrity.rows import write_rows
 from genpolicy.statistics.eprocess import paired_e_value
 
 TABLE = "stress/rollouts.parquet"
@@ -55,3 +59,11 @@ def test_a_baseline_that_did_not_meet_the_plan_is_not_called_the_best(ladder):
     report = judge(ladder, "D")
     assert report.verdict == "FAIL"
     assert report.decision.startswith("return to the simpler policy (bc did not meet")
+
+
+def test_what_layers_refused_is_bound(ladder):
+    """Nobody reads it to judge, and it stands in bundles and pictures of failures."""
+    table = ladder / REFUSED
+    write_rows(table, RefusedRow, [])
+    evidence.record(ladder)
+    assert judge(ladder, "D").materials[REFUSED] == sha256_file(table)
