@@ -28,10 +28,11 @@ from genpolicy.evidence.rows.reproducibility import (
     VARIATIONS,
     VariationRow,
 )
-from genpolicy.policies.fixtures import CANDIDATES
 
 VARIED = f"{RELOAD}/variations.parquet"
-COMPANY = 2 * CANDIDATES
+PLAINLY = 2
+"""Chunks that one observation is asked for at once, as fixtures always are."""
+COMPANY = 2 * PLAINLY
 """Chunks that one observation is asked for at once where it stands beside others than usually."""
 OBEYS = ("torch", "onnx")
 """Kinds of programs whose threads are set and not asked for."""
@@ -107,7 +108,7 @@ def _cannot(evidence: Evidence, candidate: str) -> tuple[str, ...]:
     if entry is None or told is None:
         raise MissingEvidenceError(f"nobody says what {candidate} can be asked")
     threads = () if entry.kind in OBEYS else (THREADS,)
-    if not entry.stochastic or told.most_candidates < CANDIDATES:
+    if not entry.stochastic or told.most_candidates < PLAINLY:
         return (*threads, *BATCH)
     return threads if told.most_candidates >= COMPANY else (*threads, TOGETHER)
 
@@ -128,7 +129,7 @@ def _require_whole(rows: pd.DataFrame, fixtures: dict[int, int]) -> None:
     compared = counts(rows, "chunks")
     ways = zip(rows["seed"], rows["variation"], rows["unknown"], compared, strict=True)
     for seed, way, unknown, chunks in ways:
-        asked = fixtures[int(seed)] * (1 if way == ALONE else CANDIDATES)
+        asked = fixtures[int(seed)] * (1 if way == ALONE else PLAINLY)
         if chunks != (0 if unknown else asked):
             raise MissingEvidenceError(
                 f"{chunks:g} chunks were compared by {way} of seed {seed}, of {asked}"

@@ -101,11 +101,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     journals = [shard.journal for shard in shards]
     comparison = shards[0].comparison
     task = load_task(comparison.task)
-    robot = cell_of(
-        task,
-        comparison.feasibility,
-        action_period_s=comparison.cell.horizons.action_period_s,
-    )
+    period_s = comparison.cell.horizons.action_period_s
+    robot = cell_of(task, comparison.feasibility, action_period_s=period_s)
     checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
     CHECKER.write(folder, checked)
     _write_envelope(folder, shards)
