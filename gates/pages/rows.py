@@ -40,6 +40,10 @@ COMPARED = (ROLLOUTS,)
 """Tables in which a candidate is held against others, so that rows of all methods count."""
 ROLLOUT = ("method", "perturbation", "start")
 """What names a rollout, in the order of its name."""
+MISSING = "missing, it is not built here"
+ALTERED = "what lies here has other bytes than were judged"
+OTHERS = "none of a candidate of this gate"
+UNREADABLE = "it cannot be read"
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that a spreadsheet would run."""
 HEAD = (
@@ -89,10 +93,12 @@ class Rows:
     Attributes:
         folder: Name of their folder, which lies beside the page.
         files: By path of the evidence, then by method.
+        lacking: Why a table or document that a criterion read has none, by its path.
     """
 
     folder: str
     files: tuple[RowsFile, ...]
+    lacking: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, path: str) -> list[RowsFile]:
         """Files of one table or document; none where it is not evidence that lies here."""
@@ -118,7 +124,7 @@ def rows_folder(gate: str) -> str:
 def rows_of(root: Path, report: GateReport) -> Rows:
     """Files of rows under the numbers of a report, from the evidence that it names.
 
-    What is missing below `root`, or has other bytes than were judged, has no file.
+    What is missing below `root`, or has other bytes than were judged, has no file and says so.
     """
     asked: dict[str, set[str | None]] = {}
     for answer in report.criteria:
@@ -126,13 +132,18 @@ def rows_of(root: Path, report: GateReport) -> Rows:
             asked.setdefault(path, set()).add(answer.candidate)
     played = frozenset(path for path in report.materials if path.endswith(".mcap"))
     found: list[RowsFile] = []
+    lacking: dict[str, str] = {}
     for path, whose in sorted(asked.items()):
         if path.startswith(ARTIFACTS) and path.endswith((".parquet", ".json")):
             # What is asked of the gate may compare all methods; of a candidate, its own is asked.
             compares = None in whose or path in COMPARED
             only = frozenset[str]() if compares else frozenset(filter(None, whose))
-            found += _files(root / path, path, report.materials.get(path, ""), played, only)
-    return Rows(PurePosixPath(rows_folder(report.gate)).name, tuple(found))
+            files = _files(root / path, path, report.materials.get(path, ""), played, only)
+            if isinstance(files, str):
+                lacking[path] = files
+            else:
+                found += files
+    return Rows(PurePosixPath(rows_folder(report.gate)).name, tuple(found), lacking)
 
 
 def printed_rows(rows: Rows, report: GateReport) -> dict[str, bytes]:
@@ -161,14 +172,16 @@ def _exact(value: float | None) -> str:
 
 def _files(
     file: Path, path: str, judged: str, played: frozenset[str], only: frozenset[str]
-) -> tuple[RowsFile, ...]:
-    """Files of what lies there, if it is what was judged; of these methods, or of all."""
+) -> tuple[RowsFile, ...] | str:
+    """Files of what lies there, of these methods or of all; or why there are none."""
+    if not file.is_file():
+        return MISSING
     try:
-        if sha256_file(file) == judged:
-            return _split(file, path, judged, played, only)
+        if sha256_file(file) != judged:
+            return ALTERED
+        return _split(file, path, judged, played, only) or OTHERS
     except GenpolicyError:
-        pass
-    return ()
+        return UNREADABLE
 
 
 @lru_cache(maxsize=KEPT_TABLES)

@@ -129,9 +129,9 @@ def svg(figure: Figure, label: str) -> Markup:
     smallest = min(map(float, TEXT_SIZE.findall(body)), default=LEAST_TEXT_PX)
     least = math.ceil(POINTS_PER_INCH * figure.get_figwidth() * LEAST_TEXT_PX / smallest)
     start = Markup(
-        '<div class="plot" style="--least:{}px" tabindex="0" role="group" aria-label="{}, '
-        'scrolls sideways on a narrow screen"><svg role="img" aria-label="{}" {}>'
-    ).format(least, label, label, Markup(box.group(0) if box else ""))
+        '<div class="plot" style="--least:{}px" tabindex="0" role="group" aria-label="scrolls '
+        'sideways on a narrow screen"><svg role="img" aria-label="{}" {}>'
+    ).format(least, label, Markup(box.group(0) if box else ""))
     return start + Markup(body.strip()) + Markup("</div>")
 
 

@@ -69,7 +69,7 @@ def test_the_style_sheet_keeps_that_width_on_every_screen():
 
 def test_texts_of_clips_can_be_read_in_the_narrowest_column():
     (least, size) = re.search(
-        r"\.clip svg\{[^}]*min-width:([\d.]+)rem[^}]*font-size:([\d.]+)px", SCREEN
+        r"\.clip svg\{[^}]*min-width:min\(([\d.]+)rem,100%\)[^}]*font-size:([\d.]+)px", SCREEN
     ).groups()
     assert float(least) * PX_PER_REM / WIDTH * float(size) >= LEAST_TEXT_PX
     assert float(least) * PX_PER_REM < NARROW_PX - 5 * PX_PER_REM

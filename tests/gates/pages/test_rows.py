@@ -11,8 +11,10 @@ import pytest
 
 from gates.evidence import Evidence
 from gates.pages import rows as module
+from gates.pages.page import gate_page
 from gates.pages.rows import CRITERIA, LARGEST_BYTES, printed_rows, rows_folder, rows_of
 from gates.proof import judge
+from genpolicy.integrity.hashing import sha256_file
 
 ROLLOUTS = "artifacts/stress/rollouts.parquet"
 
@@ -86,8 +88,23 @@ def test_evidence_of_other_bytes_has_no_rows(copied, judged):
     evidence.edit_table(copied, "stress/rollouts.parquet", lambda f: f.assign(force_peak_n=1.0))
     rows = rows_of(copied, judged("D"))
     assert rows.of(ROLLOUTS) == [] and rows.of("artifacts/stress/power.json")
+    assert rows.lacking == {ROLLOUTS: module.ALTERED}
     (copied / "artifacts/stress/power.json").unlink()
-    assert rows_of(copied, judged("D")).of("artifacts/stress/power.json") == []
+    rows = rows_of(copied, judged("D"))
+    assert rows.of("artifacts/stress/power.json") == []
+    assert rows.lacking["artifacts/stress/power.json"] == module.MISSING
+    page = gate_page(copied, judged("D"))
+    assert f"no rows: {module.ALTERED}" in page and f"no rows: {module.MISSING}" in page
+
+
+def test_a_table_of_other_methods_alone_says_so(copied, judged):
+    """What is asked of candidates only, of a table in which none of them stands."""
+    path = "artifacts/stress/invocations.parquet"
+    evidence.edit_table(copied, "stress/invocations.parquet", lambda f: f.assign(method="another"))
+    digest = sha256_file(copied / path)
+    report = judged("D")
+    bound = report.model_copy(update={"materials": {**report.materials, path: digest}})
+    assert rows_of(copied, bound).lacking == {path: module.OTHERS}
 
 
 def test_a_table_is_read_once_for_all_its_printings(whole, judged, monkeypatch):
