@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, cast
 from uuid import uuid4
 
@@ -44,6 +45,10 @@ from flows.server import api_url, watch_server
 WAITS = "e"
 FLOW = "gate-e"
 BY_HAND = "by-hand"
+OPEN = (["FAIL"], ["INCONCLUSIVE"], [PENDING])
+"""How a line of `genpolicy card verify` begins that keeps the card from being good."""
+MOST_SAID = 2000
+"""Characters of it that a state of Prefect is given."""
 SUSPENDED, RESUMING = "Suspended", "Resuming"
 HOW_TO_GO_ON = (
     "Gate E waits: its run is suspended until people have signed the card (docs/gate-e.md). "
@@ -102,9 +107,10 @@ def ask_card(workspace: Path) -> tuple[int, list[str]]:
 
 
 def refusal(lines: Sequence[str]) -> str:
-    """Of what `genpolicy card verify` said, the verdict and what does not hold."""
-    wrong = [line.strip() for line in lines if line.split()[:1] in (["FAIL"], ["INCONCLUSIVE"])]
-    return " ".join([*lines[:1], *wrong]) or "genpolicy card verify said nothing"
+    """Of what `genpolicy card verify` said, the verdict and what does not hold; else all of it."""
+    wrong = [line.strip() for line in lines[1:] if line.split()[:1] in OPEN]
+    said = " ".join([*lines[:1], *(wrong or lines[1:])])
+    return shorten(said, MOST_SAID, placeholder=" ...") or "genpolicy card verify said nothing"
 
 
 def hand_over(workspace: str, stages: Sequence[str], served: str) -> None:

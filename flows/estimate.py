@@ -30,7 +30,7 @@ def estimate(workspace: Path) -> str:
         return f"Estimate: {DOCUMENTED}."
     others = len(stages) - len(known)
     of = f"{len(known)} of {len(stages)} stages" if others else f"all {len(stages)} stages"
-    rest = f" The other {others} have not run here, and nobody knows." if others else ""
+    rest = f" The other {others} have no finished run here, and nobody knows." if others else ""
     total = duration(sum(known))
     return f"Estimate: {total} for {of}, as last time here; what is up to date is skipped.{rest}"
 

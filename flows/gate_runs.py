@@ -117,6 +117,8 @@ def run_gate(workspace: Path, letter: str, stages: Sequence[str]) -> State[Any]:
         name = stopped.verdict or STATE_NAMES[stopped.code]
         return Failed(name=name, message=stopped.sentence)
     verdict, sentence = judged(workspace, f"gate_{letter}")
+    if verdict not in GOES_ON:  # no stage was run that could have said so
+        return Failed(name=verdict, message=sentence)
     return Completed(name=verdict if verdict == PENDING else None, message=sentence)
 
 

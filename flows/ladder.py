@@ -85,7 +85,7 @@ def ladder(workspace: str = ".") -> State[Any]:
             if not state.is_completed():
                 return Failed(name=state.name, message=state.message)
         if WAITS in plan and deployment.name:
-            hand_over(workspace, plan[WAITS], deployment.name)
+            hand_over(str(Path(workspace).resolve()), plan[WAITS], deployment.name)
     return Completed(name=state.name, message=state.message)
 
 

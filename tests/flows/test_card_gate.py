@@ -121,7 +121,11 @@ def test_a_newer_ladder_waits_in_the_place_of_an_older_and_of_no_other_workspace
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        (["FAIL: No.", "  PASS  a: x", "  FAIL  b: y"], "FAIL: No. FAIL  b: y"),
+        (["FAIL: No.", "  PASS  a: x", "  FAIL  b: y"], "FAIL: No. FAIL b: y"),
+        (["PENDING_REVIEW: No.", "  PASS  a: x", "  PENDING_REVIEW  c: z"],
+         "PENDING_REVIEW: No. PENDING_REVIEW c: z"),
+        (["Traceback:", "  in main", "ValueError: b"], "Traceback: in main ValueError: b"),
+        (["a " * 5000], "a " * 998 + "..."),
         (["cards is not there, expected cards."], "cards is not there, expected cards."),
         ([], "genpolicy card verify said nothing"),
     ],

@@ -36,7 +36,7 @@ def test_stages_that_have_run_are_summed_and_the_others_counted(workspace):
     took(workspace, "retired", 900.0)
     assert estimate(workspace) == (
         "Estimate: 3 min for 2 of 3 stages, as last time here; what is up to date is skipped. "
-        "The other 1 have not run here, and nobody knows."
+        "The other 1 have no finished run here, and nobody knows."
     )
     took(workspace, "gate_a", 20.0)
     assert estimate(workspace) == (
