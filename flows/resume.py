@@ -11,7 +11,7 @@ from prefect.flow_runs import resume_flow_run
 
 from flows.card_gate import BY_HAND, SUSPENDED, ask_card, go_on, refusal, told, waiting
 from flows.reproduce import EXIT_DONE, EXIT_FAULT, stop_all
-from flows.server import server_is_there
+from flows.server import database, server_is_there
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError
 
@@ -31,7 +31,7 @@ def resume_gate(workspace: Path) -> int:
         if not runs:
             raise BadInputError(
                 where=str(workspace),
-                found="a workspace for which no run of gate E waits",
+                found=f"a workspace for which no run of gate E waits in {database()}",
                 expected="one that is suspended",
                 action="Run `genpolicy ladder`; it ends there when gates A to D pass.",
             )

@@ -11,7 +11,7 @@ from flows import prefect_settings  # noqa: F401
 # isort: split
 import httpx
 from prefect import get_client
-from prefect.settings import PREFECT_API_URL
+from prefect.settings import PREFECT_API_URL, PREFECT_HOME
 
 from flows.reproduce import EXIT_FAULT, stop_all
 
@@ -70,6 +70,11 @@ def server_url() -> str | None:
     """Address of the Prefect server that the settings name; None for a temporary one."""
     url = PREFECT_API_URL.value()
     return str(url) if url else None
+
+
+def database() -> str:
+    """Where runs are looked for: at the server that the settings name, or in which folder."""
+    return server_url() or f"the database below {PREFECT_HOME.value()}"
 
 
 def server_answers(url: str, *, timeout_s: float = FIRST_ANSWER_S) -> bool:

@@ -9,6 +9,7 @@ from prefect import get_client
 from prefect.client.schemas.objects import StateType
 from prefect.states import Completed
 
+from flows.server import database
 from flows.workspace import make_workspace
 from genpolicy.cli.shell import run_program
 
@@ -67,7 +68,8 @@ def test_a_run_that_is_served_is_resumed_and_left_to_who_serves_it(workspace, mo
 
 def test_where_nothing_waits_it_says_so(tmp_path, capsys):
     assert main(tmp_path) == 2
-    assert "for which no run of gate E waits" in capsys.readouterr().err
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"for which no run of gate E waits in {database()}" in said
 
 
 def test_without_the_server_that_was_named_nothing_is_asked(tmp_path, monkeypatch):
