@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from textwrap import shorten
 
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags
 from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, PASSED
@@ -15,7 +16,7 @@ from gates.pages.desk_costs import share
 from gates.pages.figures import Listing, Picturable, Shown, Table, draw_all, in_order
 from gates.pages.plots_time import TEMPERATURES
 from gates.pages.rows import RowsFile, rows_of
-from gates.report import GATES, NAMES, Gate, GateReport, parse_report, report_bytes
+from gates.report import GATES, NAMES, Gate, GateReport, parse_report, report_bytes, report_path
 from gates.reproducibility.latency_budget import LATENCY, MILLI, budget_of
 from gates.stress.rollouts import ROLLOUTS
 from genpolicy.audit.rows import ModeOutcome
@@ -27,6 +28,9 @@ from genpolicy.evidence.rows.stress import RolloutRow
 MODES = f"{AUDIT}/modes.parquet"
 UNBROKEN = "\u00a0"
 """A space at which no line ends, so that a share and its counts stay readable in a narrow cell."""
+UNREADABLE = "no report that can be read"
+MOST = 200
+"""Characters of a reason; the gate's page has all of it."""
 KEPT = 8
 """The desk is printed again by every gate; the same evidence is drawn once in a process."""
 
@@ -63,7 +67,8 @@ def _exhibit(
     gate: Gate, report: GateReport | None, evidence: Evidence, signing: Signing
 ) -> Exhibit:
     if report is None:
-        return Exhibit(gate, NAMES[gate], missing="not judged")
+        there = (evidence.root / report_path(gate)).is_file()
+        return Exhibit(gate, NAMES[gate], missing=UNREADABLE if there else "not judged")
     if gate == "E":
         return _signatures(signing)
     sources = dict.fromkeys(path for item in SHOWN[gate] for path in (item.source, *item.also))
@@ -71,7 +76,7 @@ def _exhibit(
         for path in sources:
             require_bound(evidence, report, path)
     except (MissingEvidenceError, GenpolicyError) as error:
-        return Exhibit(gate, NAMES[gate], missing=" ".join(str(error).split())[:200])
+        return Exhibit(gate, NAMES[gate], missing=shorten(str(error), MOST, placeholder=" …"))
     figure, table = _drawn(evidence.root, gate, report_bytes(report))
     own = tuple(file for file in rows_of(evidence.root, report).files if file.path in sources)
     return Exhibit(gate, NAMES[gate], figure, table, own)
@@ -137,16 +142,16 @@ def _layers(evidence: Evidence, report: GateReport) -> Table:
 
 
 def _successes(evidence: Evidence, report: GateReport) -> Table:
-    """Success of each method in each judged condition, and in all together."""
+    """Success of each method in each judged condition; what it costs has all of them together."""
     frame = evidence.rows(ROLLOUTS, RolloutRow)
     planned = [str(name) for name in report.settings["perturbations"]]
     frame = frame[frame["perturbation"].isin(planned)]
     lines = []
     for method in in_order(frame["method"]):
         own = frame[frame["method"] == method]
-        parts = [own, *(own[own["perturbation"] == name] for name in planned)]
+        parts = [own[own["perturbation"] == name] for name in planned]
         lines.append((method, *(_share(flags(rows, "success").sum(), len(rows)) for rows in parts)))
-    return ("method", "all", *(name.replace("_", " ") for name in planned)), *lines
+    return ("method", *(name.replace("_", " ") for name in planned)), *lines
 
 
 def _share(hits: float, of: float) -> str:

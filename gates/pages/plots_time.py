@@ -194,7 +194,8 @@ PLOTS = (
         "The eleven terms from exposure to queue, logarithmic. Declared terms are drawn from "
         "settings, the others were measured here, one thread. Adding up the p95 of the terms is "
         "the budget on paper; invocations may take less, where slow terms do not coincide, or "
-        "more. Both stand below the figure, with intervals for these processes and no others.",
+        "more. Both stand below it on the page of gate B, with intervals for "
+        "these processes and no others.",
         LATENCY,
         _latency,
         read=_budgets,

@@ -50,7 +50,7 @@ def _of_each(evidence: Evidence, report: GateReport) -> Iterable[tuple[str, pd.D
 def _typical(rows: pd.DataFrame, column: str) -> str:
     """Median and 95th percentile."""
     middle, high = np.quantile(numbers(rows, column), [0.5, 0.95], method="higher")
-    return f"{middle:.3g} ({high:.3g})"
+    return f"{middle:.3g}, p95 {high:.3g}"
 
 
 def _line(rows: pd.DataFrame, confidence: float) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ def _line(rows: pd.DataFrame, confidence: float) -> tuple[str, ...]:
     return (
         f"{len(rows)}",
         f"{rows['start'].nunique()}",
-        f"{flags(rows, 'recovered').sum():g} ({share:.3g})",
+        f"{flags(rows, 'recovered').sum():g}, share {share:.3g}",
         f"{lower:.3g} to {upper:.3g}",
         f"{ended.get('handed_back', 0)}",
         f"{flags(rows, 'resampled_only').sum():g}",
@@ -126,7 +126,7 @@ LISTINGS = (
         "arm to its goal, the policy took over and the rollout succeeded, and no later recovery of "
         "it began in the same phase. One that handed back and had commanded nothing but the pose "
         "that was held left all help to new samples: it counts as not recovered. The interval is "
-        "exact, over starts. Time and force: median, and the 95th percentile in brackets, from "
+        "exact, over starts. Time and force: median, and p95, the 95th percentile, from "
         "the begin of the entry to its end. Derived again from the journals by genpolicy verify "
         "report.",
         RECOVERIES,

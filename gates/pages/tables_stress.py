@@ -29,7 +29,7 @@ def _typical(rows: pd.DataFrame, column: str, scale: float = 1.0) -> str:
     if len(known) == 0:
         return "not measured"
     middle, high = np.quantile(scale * numbers(known, column), [0.5, 0.95], method="higher")
-    return f"{middle:.3g} ({high:.3g})"
+    return f"{middle:.3g}, p95 {high:.3g}"
 
 
 def _line(rows: pd.DataFrame) -> tuple[str, ...]:
@@ -68,8 +68,8 @@ LISTINGS = (
         "Splices",
         "How a chunk that entered the queue meets what was commanded before it: the way from the "
         "last command to its first row that was due, and the largest jerk of the TCP over that "
-        "boundary, each as proposed and as admitted after projection; median, and the 95th "
-        "percentile in brackets. The rule is the comparison's, equal for all methods; a method "
+        "boundary, each as proposed and as admitted after projection; median, and p95, "
+        "the 95th percentile. The rule is the comparison's, equal for all methods; a method "
         "that it cannot hold for stands with replace. Nothing here is judged: what is admitted "
         "keeps the limits of all six layers, and Gate C bounds the jerk.",
         FILE,

@@ -17,7 +17,9 @@ pytestmark = pytest.mark.skipif(
     browser.chromium() is None,
     reason="no Chromium on this machine: it alone counts sheets and measures what is shown",
 )
-NARROW_PX = 420
+NARROW_PX, WIDE_PX = 420, 1200
+LEAST_ON_PAPER_PX = 7.0
+"""Of a text, where 1 px is 1/96 inch: 5.25 points."""
 NAMES = ("gate_a", "gate_b", "gate_c", "gate_d", "gate_e", "index")
 DRAWN = {"gate_a", "gate_b", "gate_c", "gate_d"}
 SHEETS = dict.fromkeys(NAMES, 6) | {"gate_e": 2}
@@ -55,6 +57,13 @@ def test_every_text_of_a_drawing_can_be_read_on_a_narrow_screen(pages, name, tmp
     assert min([size for size, _ in told["texts"]], default=LEAST_TEXT_PX) >= LEAST_TEXT_PX
     assert told["wide"] == 0 and told["unannounced"] == []
     assert bool(told["texts"]) == (name in DRAWN)
+
+
+def test_the_figures_of_the_desk_are_whole_on_a_wide_screen_and_on_paper(pages, tmp_path):
+    wide = browser.measured(pages["index"], tmp_path, width_px=WIDE_PX)
+    assert min(size for size, _ in wide["texts"]) >= LEAST_TEXT_PX and wide["sideways"] == []
+    paper = on_paper(pages["index"], tmp_path)
+    assert min(size for size, _ in paper["texts"]) >= LEAST_ON_PAPER_PX
 
 
 def test_a_clip_can_be_read_and_shows_one_moment(tmp_path):

@@ -32,11 +32,11 @@ def test_each_phase_and_cause_has_a_line_with_its_interval_and_cost(whole, judge
     hits, n = int(own["recovered"].sum()), len(DRILLED)
     lower, upper = clopper_pearson(hits, n, 0.95)
     assert (line["entered"], line["starts"]) == (f"{n}", f"{n}")
-    assert line["recovered"] == f"{hits} ({hits / n:.3g})"
+    assert line["recovered"] == f"{hits}, share {hits / n:.3g}"
     assert line["interval"] == f"{lower:.3g} to {upper:.3g}"
     times = sorted(2.0 + 0.01 * start for start in DRILLED)
     middle, high = (times[-(-p * (n - 1) // 100)] for p in (50, 95))
-    assert line["time, s"] == f"{middle:.3g} ({high:.3g})"
+    assert line["time, s"] == f"{middle:.3g}, p95 {high:.3g}"
     assert line["handed back"] == f"{hits}" and line["of these by samples alone"] == "0"
 
 

@@ -19,7 +19,7 @@ def drawn(root, report):
 
 def quantiles(values):
     middle, high = np.quantile(np.array(values), [0.5, 0.95], method="higher")
-    return f"{middle:.3g} ({high:.3g})"
+    return f"{middle:.3g}, p95 {high:.3g}"
 
 
 def test_each_method_stands_with_its_rule_and_with_both_ends_of_projection(whole, judged):
