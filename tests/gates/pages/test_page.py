@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
 from markup import Markup
 from team import PEOPLE, Team
 
+from gates.pages.page import index_page
 from gates.pages.summary import markdown
 from gates.report import report_path
 from gates.writing import write_gate, write_index
@@ -80,6 +81,17 @@ def test_the_front_page_names_every_gate(pages):
     for gate in "ABCDE":
         assert f"gate_{gate.lower()}.html" in text
     assert "PENDING REVIEW" in text and "http:" not in text.replace("http-equiv", "")
+
+
+def test_the_links_between_pages_lead_to_what_is_there(pages, tmp_path):
+    """A gate's page to the boxes of the desk, which leads to pages of judged gates alone."""
+    boxes = set(re.findall('id="(gate-[a-e])"', index_page(tmp_path)))
+    assert boxes == {f"gate-{gate}" for gate in "abcde"}
+    assert 'href="gate_' not in index_page(tmp_path)
+    for gate in "abcde":
+        (nav,) = re.findall("<nav.*?</nav>", _page(pages, gate))
+        assert set(re.findall('index.html#(gate-.)"', nav)) == boxes - {f"gate-{gate}"}
+        assert "gate_" not in nav
 
 
 def test_names_cannot_break_out_of_page_figure_or_table(ladder):
