@@ -38,6 +38,7 @@ addEventListener('load', () => {
     texts: all('svg text').map((one) => [size(one), one.textContent]),
     outside: boxes.filter(out).map(name),
     sideways: boxes.filter((one) => cut(one) && look(one).overflowX != 'visible').map(name),
+    plots: all('.plot').filter(cut).map(name),
     unannounced: all('.plot').filter((one) => said(one) != cut(one)).map(name),
     moments: all('.moment').map((one) => one.getAttribute('style')),
     buttons: all('input').length,
@@ -70,9 +71,9 @@ def measured(text: str, folder: Path, *, width_px: int, paper: bool = False) -> 
 
     Returns:
         Size in px and words of each text of a drawing, what reaches outside the page, what is cut
-        or scrolls sideways, plots whose note on that is missing or stands without need, by how much
-        the page as a whole is wider than the screen, px, and which moments and how many buttons of
-        clips are seen.
+        or scrolls sideways, plots that do, plots whose note on that is missing or stands without
+        need, by how much the page as a whole is wider than the screen, px, and which moments and
+        how many buttons of clips are seen.
     """
     text = re.sub(r"<meta http-equiv[^>]*>", "", text)
     if paper:

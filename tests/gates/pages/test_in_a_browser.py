@@ -21,8 +21,8 @@ NARROW_PX, WIDE_PX = 420, 1200
 LEAST_ON_PAPER_PX = 7.0
 """Of a text, where 1 px is 1/96 inch: 5.25 points."""
 NAMES = ("gate_a", "gate_b", "gate_c", "gate_d", "gate_e", "index")
-DRAWN = {"gate_a", "gate_b", "gate_c", "gate_d"}
-SHEETS = dict.fromkeys(NAMES, 6) | {"gate_e": 2}
+DRAWN = {"gate_a", "gate_b", "gate_c", "gate_d", "index"}
+SHEETS = dict.fromkeys(NAMES, 6) | {"gate_e": 2, "index": 7}
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_every_text_of_a_drawing_can_be_read_on_a_narrow_screen(pages, name, tmp
 
 def test_the_figures_of_the_desk_are_whole_on_a_wide_screen_and_on_paper(pages, tmp_path):
     wide = browser.measured(pages["index"], tmp_path, width_px=WIDE_PX)
-    assert min(size for size, _ in wide["texts"]) >= LEAST_TEXT_PX and wide["sideways"] == []
+    assert min(size for size, _ in wide["texts"]) >= LEAST_TEXT_PX and wide["plots"] == []
     paper = on_paper(pages["index"], tmp_path)
     assert min(size for size, _ in paper["texts"]) >= LEAST_ON_PAPER_PX
 
