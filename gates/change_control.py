@@ -146,8 +146,9 @@ def _unknown(root: Path) -> str:
 
 def _exceptions(root: Path, params: Mapping[str, Any]) -> Iterator[str]:
     """Who committed each written exception, and when."""
-    for entry, commit in brought_by(root, read_overrides(root, params)):
-        who = git(root, "log", "-1", "--format=%an <%ae>, %h of %cs", commit) if commit else ""
+    for entry, commits in brought_by(root, read_overrides(root, params)):
+        asked = (git(root, "log", "-1", "--format=%an <%ae>, %h of %cs", one) for one in commits)
+        who = "; ".join(one for one in asked if one)
         yield (
             f"{placed(entry)}: {entry.limit:.6g} by {entry.by} until {entry.expires}, committed "
             f"by {who or f'nobody: {NOT_COMMITTED}'}"

@@ -9,6 +9,7 @@ and left out of the history until the plan was committed looks like evidence tha
 
 import re
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
@@ -40,8 +41,13 @@ MAKERS = "a <%ae>%nc <%ce>%n%(trailers:key=Co-authored-by,valueonly,unfold,separ
 """Per commit: who wrote it, who committed it, and who is named as having helped."""
 FORGE = "noreply@github.com"
 """Commits what is merged by a button; nobody's own address."""
+FULL = ("--full-history", "-m", "--format=%H")
+"""Commits of every side of a merge: git leaves out a side that the merge did not take."""
 PLAN_FIRST = "Plan, commit, run, commit, and have it reviewed by somebody else; then sign."
-SAY_SO = f"Whoever overrides a limit commits the entry of {OVERRIDES} with their own hands."
+SAY_SO = (
+    f"Whoever overrides a limit commits the entry of {OVERRIDES} with their own hands; one that "
+    "somebody else brought once, with another reason or last day."
+)
 NAME_ALL = (
     f"Name all who made it in `card.authors`, by their addresses on {ALLOW_LIST}; let others sign."
 )
@@ -158,6 +164,9 @@ def require_author_of_brought(
 def require_said_by_themselves(root: Path, allowed: AllowList) -> None:
     """Require that each exception to a limit was committed by the person whom it names.
 
+    By the author of the commits alone: whom a trailer names as having helped has not said so.
+    Every commit counts that ever brought it, so that nobody revives what was withdrawn.
+
     Args:
         root: Repository root.
         allowed: The allow-list; everybody on it needs an address.
@@ -174,25 +183,42 @@ def require_said_by_themselves(root: Path, allowed: AllowList) -> None:
     _require_whole(root)
     if git(root, "diff", "--quiet", "HEAD", "--", OVERRIDES) is None:
         _refuse(OVERRIDES, "not committed as it lies here", "committed by whom it names", SAY_SO)
-    for entry, commit in brought_by(root, entries):
+    for entry, commits in brought_by(root, entries):
         person = allowed.find(entry.by)
         own = {mail.casefold() for mail in person.emails} if person else set()
-        makers = _addresses(git(root, "log", "-1", f"--format={MAKERS}", commit) or "")
-        if not commit or not own & set(makers):
-            found = f"committed by {', '.join(makers)}" if commit else "in no commit"
+        mails = [(git(root, "log", "-1", "--format=%ae", one) or "").casefold() for one in commits]
+        if not commits or not own.issuperset(mails):
+            others = ", ".join(mail or "nobody" for mail in sorted({*mails} - own))
+            found = f"committed by {others}" if commits else "in no commit"
             _refuse(placed(entry), found, f"a commit of {entry.by}, whom it names", SAY_SO)
 
 
-def brought_by(root: Path, entries: Sequence[Override]) -> list[tuple[Override, str]]:
-    """Each exception with the commit that brought it as it stands; empty where none did."""
-    commits = (git(root, "log", "--format=%H", "--", OVERRIDES) or "").split()
-    versions = [(commit, _exceptions_at(root, commit)) for commit in commits]
-    found = []
-    for entry in entries:
-        lacking = next((n for n, (_, held) in enumerate(versions) if entry not in held), None)
-        holding = [commit for commit, _ in versions[:lacking]]
-        found.append((entry, holding[-1] if holding else ""))
-    return found
+def brought_by(root: Path, entries: Sequence[Override]) -> list[tuple[Override, list[str]]]:
+    """Each exception with all commits that ever brought it as it stands, the newest first.
+
+    A merge brings what none of its parents holds, and what one of them withdrew: an exception that
+    one side had taken out and the other keeps is said by whoever decided between them.
+    """
+    listed = git(root, "log", "--full-history", "-m", "--format=%H %P", "--", OVERRIDES) or ""
+    commits = [line.split() for line in dict.fromkeys(listed.splitlines())]
+    known = {commit: _exceptions_at(root, commit) for commit in {*chain(*commits)}}
+    changed = [commit for commit, *_ in commits]
+    behind = {
+        parent: {*(git(root, "log", *FULL, parent, "--", OVERRIDES) or "").split()}
+        for _, *parents in commits
+        if len(parents) > 1
+        for parent in parents
+    }
+
+    def brings(entry: Override, commit: str, parents: Sequence[str]) -> bool:
+        lacking = [parent for parent in parents if entry not in known[parent]]
+        if entry not in known[commit] or len(lacking) == len(parents):
+            return entry in known[commit]
+        return any(entry in known[one] for at in lacking for one in changed if one in behind[at])
+
+    return [
+        (entry, [c for c, *parents in commits if brings(entry, c, parents)]) for entry in entries
+    ]
 
 
 def _exceptions_at(root: Path, commit: str) -> tuple[Override, ...]:
@@ -253,7 +279,7 @@ def _after(root: Path, versions: Sequence[tuple[str, dict[str, object]]], gate: 
 
 def commits_of(root: Path, digest: str) -> set[str]:
     """Commits that brought a hash into the lock file or took it out, on whatever branch."""
-    found = git(root, "log", "--full-history", "-m", "--format=%H", f"-S{digest}", "--", LOCK)
+    found = git(root, "log", *FULL, f"-S{digest}", "--", LOCK)
     return {*(found or "").split()}
 
 

@@ -552,3 +552,64 @@ def test_an_exception_that_is_not_committed_is_nobodys(history):
     commit("eve")
     with pytest.raises(IntegrityError, match="a commit of eve"):
         require_said_by_themselves(root, RITA)
+
+
+@pytest.mark.parametrize("author", ["ada", "rita"])
+def test_a_merge_does_not_revive_what_was_withdrawn(history, author):
+    """Git leaves the side that `-s ours` threw away out of a file's history."""
+    root, commit = history
+    commit("rita", overrides=_exceptions(EXCEPTION))
+    commit.git("checkout", "-q", "-b", "side")
+    commit("rita", overrides=_exceptions())
+    commit.git("checkout", "-q", "main")
+    named = ("-c", f"user.name={author}", "-c", f"user.email={author}@example.org")
+    commit.git(*named, "merge", "-q", "--no-ff", "-m", "x", "-s", "ours", "side")
+    if author == "rita":
+        require_said_by_themselves(root, RITA)
+        return
+    with pytest.raises(IntegrityError, match=r"committed by ada@example\.org"):
+        require_said_by_themselves(root, RITA)
+    commit("ada", params="later")
+    with pytest.raises(IntegrityError, match=r"committed by ada@example\.org"):
+        require_said_by_themselves(root, RITA)
+    commit("rita", overrides=_exceptions({**EXCEPTION, "reason": "again"}))
+    require_said_by_themselves(root, RITA)
+
+
+@pytest.mark.parametrize("on", ["main", "side"])
+def test_a_merge_of_what_they_said_is_still_theirs(history, on):
+    """Whoever merges a branch, before or after the entry, has withdrawn and said nothing."""
+    root, commit = history
+    commit("ada", overrides=_exceptions())
+    commit.git("checkout", "-q", "-b", "side")
+    commit("rita" if on == "side" else "ada", **{
+        "overrides" if on == "side" else "params": _exceptions(EXCEPTION)
+    })  # fmt: skip
+    commit.git("checkout", "-q", "main")
+    commit("rita" if on == "main" else "ada", **{
+        "overrides" if on == "main" else "params": _exceptions(EXCEPTION)
+    })  # fmt: skip
+    commit.merge("side")
+    require_said_by_themselves(root, RITA)
+
+
+def test_an_entry_that_only_a_merge_holds_is_by_who_merged(history):
+    root, commit = history
+    commit("rita", overrides=_exceptions())
+    commit.git("checkout", "-q", "-b", "side")
+    commit("mo", params="a: 2")
+    commit.git("checkout", "-q", "main")
+    commit.merge("side", "--no-commit")
+    commit("ada", overrides=_exceptions(EXCEPTION))
+    with pytest.raises(IntegrityError, match=r"committed by ada@example\.org"):
+        require_said_by_themselves(root, RITA)
+
+
+def test_whom_a_commit_names_as_having_helped_has_said_nothing(history):
+    root, commit = history
+    commit("ada", overrides=_exceptions(EXCEPTION))
+    named = ("-c", "user.name=ada", "-c", "user.email=ada@example.org")
+    helped = "x\n\nCo-authored-by: Rita <rita@example.org>"
+    commit.git(*named, "commit", "-q", "--amend", "-m", helped)
+    with pytest.raises(IntegrityError, match=r"committed by ada@example\.org"):
+        require_said_by_themselves(root, RITA)
