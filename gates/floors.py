@@ -41,6 +41,9 @@ HARDEST_CONTACT_N = 80.0
 OLDEST_ACTION_S = 1.0
 """Age beyond which no action is executed, s, whatever a team sets."""
 AGED = "a second ago the scene was another one"
+LONGEST_DAYS = 90
+"""Days from today to the last one of an exception: who needs a quarter needs another limit, in the
+plan and in review, and what nobody has to say again is a limit that nobody wrote."""
 DRILL, PUSH = "recovery_drill", "push"
 """Kinds of conditions that ask for a recovery, and for a contact."""
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from gates.card.people import ALLOW_LIST, AUTHOR, SPOTTER, AllowList, load_allow_list
 from gates.card.signing import utc_today
+from gates.floors import LONGEST_DAYS
 from gates.overrides import CORRECT, Override, placed, read_overrides
 from gates.report import Gate, GateReport, Overridden
 from gates.reproducibility.settings import BROUGHT_FOLDER
@@ -30,8 +31,8 @@ def require_written(root: Path, today: datetime.date | None = None) -> None:
         today: Day of the judgement; today (UTC) if not given.
 
     Raises:
-        ConfigError: One is malformed, over, or by somebody who may not; or `params.yaml` or the
-            allow-list cannot be read.
+        ConfigError: One is malformed, over, for too long, or by somebody who may not; or
+            `params.yaml` or the allow-list cannot be read.
     """
     _require(root, read_overrides(root, read_params(root)), today)
 
@@ -68,7 +69,15 @@ def _require(
     allowed, authors = load_allow_list(root), _authors(root)
     brought = _brought(root)
     for entry in entries:
-        if day > datetime.date.fromisoformat(entry.expires):
+        left = (datetime.date.fromisoformat(entry.expires) - day).days
+        if left > LONGEST_DAYS:
+            raise ConfigError(
+                where=placed(entry),
+                found=f"until {entry.expires}, {left} days from now",
+                expected=f"a last day at most {LONGEST_DAYS} days from {day} (UTC)",
+                action="An exception is for a while: write a nearer day, or change the limit.",
+            )
+        if left < 0:
             raise ConfigError(
                 where=placed(entry),
                 found=f"over since {entry.expires}",

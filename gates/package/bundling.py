@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from gates.change_control import control_of, control_text
 from gates.git import git
+from gates.overriders import require_in_force
 from gates.package.archive import write_archive
 from gates.package.contents import brought, files_of_the_run
 from gates.package.groups import GROUPS, contents
@@ -56,9 +57,10 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
             place cannot be written.
         IntegrityError: A file cannot be read.
         ConfigError: The pipeline, the parameters or an entry cannot be read, or names what lies
-            outside the workspace.
+            outside the workspace; or a limit is overridden by somebody who may not, or no longer.
     """
     rungs = require_judged(root)
+    require_in_force(root, {gate: read_report(root, gate)[0] for gate in BUNDLED[-1:]})
     groups = groups_of(root, candidate)
     checkpoint = CANDIDATES.read(root / RELOAD)[candidate].checkpoint
     statements = statements_of(root, candidate, checkpoint)

@@ -9,6 +9,7 @@ import yaml
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from gates import commands
+from gates.floors import LONGEST_DAYS
 from gates.overriders import first_end, require_in_force, require_written
 from gates.overrides import OVERRIDES
 from gates.printed import problems_beside
@@ -54,12 +55,23 @@ def _write(root, **changes):
     (root / OVERRIDES).write_text(yaml.safe_dump({"overrides": [{**ENTRY, **changes}]}))
 
 
-@pytest.mark.parametrize("days", [-400, -1, 0])
+@pytest.mark.parametrize("days", [-LONGEST_DAYS, -1, 0])
 def test_it_holds_to_its_last_day(root, days):
     _write(root)
     require_written(root, LAST + datetime.timedelta(days))
     reports = {"A": SimpleNamespace(overrides=()), "D": SimpleNamespace(overrides=(_record(),))}
     require_in_force(root, reports, LAST + datetime.timedelta(days))
+
+
+@pytest.mark.parametrize("last", [LAST + datetime.timedelta(LONGEST_DAYS + 1), "9999-12-31"])
+def test_no_exception_is_for_ever(root, last):
+    _write(root, expires=str(last))
+    text = r"days from now, expected a last day at most 90 days from 2026-12-24 \(UTC\)"
+    with pytest.raises(ConfigError, match=text):
+        require_written(root, LAST)
+    with pytest.raises(ConfigError, match=text):
+        entry = _record(expires=str(last))
+        require_in_force(root, {"D": SimpleNamespace(overrides=(entry,))}, LAST)
 
 
 @pytest.mark.parametrize("days", [1, 400])

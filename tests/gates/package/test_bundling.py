@@ -12,8 +12,8 @@ from gates.package import bundling
 from gates.package.archive import read_index
 from gates.package.bundling import package
 from gates.package.statements import statement_path
-from gates.report import read_report, report_path
-from genpolicy.errors import BadInputError, RefusedError
+from gates.report import Overridden, read_report, report_path
+from genpolicy.errors import BadInputError, ConfigError, RefusedError
 
 
 def test_a_bundle_names_groups_verdicts_and_statements(whole, tmp_path):
@@ -81,3 +81,23 @@ def test_a_commit_is_named_only_if_the_code_is_of_it(whole, tmp_path, monkeypatc
     said = {"diff": clean, "rev-parse": "c" * 40}
     monkeypatch.setattr(bundling, "git", lambda root, *words: said[words[0]])
     assert package(whole, "flow", tmp_path / "flow.zip").index.commit == commit
+
+
+def test_nobody_packages_what_stands_on_an_exception_that_is_over(whole, tmp_path, monkeypatch):
+    """Whoever verifies a bundle later has no day to ask it of: who makes one has."""
+    entry = Overridden(
+        gate="D", criterion="hold_share_upper", candidate="flow", limit=0.3, by="rita",
+        reason="r", expires="2020-01-01", comparison="<=", threshold=0.25, verdict="FAIL",
+        instead="PASS", without="FAIL",
+    )  # fmt: skip
+    real = bundling.read_report
+
+    def overridden(root, gate):
+        report, digest = real(root, gate)
+        held = (entry,) if gate == "D" else ()
+        return report.model_copy(update={"overrides": held}), digest
+
+    monkeypatch.setattr(bundling, "read_report", overridden)
+    with pytest.raises(ConfigError, match="over since 2020-01-01"):
+        package(whole, "flow", tmp_path / "flow.zip")
+    assert not (tmp_path / "flow.zip").exists()
