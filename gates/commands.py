@@ -111,9 +111,10 @@ def check(
 
     Exit 0 if every gate up to `--through` passes, 3 if one does not or its
     report is untrue, 2 if a report or a setting cannot be read, or a limit is
-    overridden by somebody who may not, or no longer. Through E, git
-    must show that the plan was committed before the evidence, and that nobody
-    but the authors committed to the candidate; 2 where it does not.
+    overridden by somebody who may not, in the name of another (as far as git
+    knows), or no longer. Through E, git must show that the plan was committed
+    before the evidence, and that nobody but the authors committed to the candidate;
+    2 where it does not.
 
     `--format junit` prints a test for each criterion, `github` an annotation for
     each that does not hold.
@@ -132,7 +133,8 @@ def check(
         try:
             require_history(root)
         except GenpolicyError as error:
-            problems.append(("history", str(error), "preregistration.yaml", error.exit_code))
+            if str(error) not in {text for _, text, _, _ in problems}:
+                problems.append(("history", str(error), "preregistration.yaml", error.exit_code))
     if layout in ("junit", "github"):
         print_cases(root, rungs, problems, layout)
     elif layout == "text" and not as_json and (said := not_built(root, every)):

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gates.card.history import require_said_by_themselves, unknown_history
+from gates.card.people import load_allow_list
 from gates.for_ci import as_github, as_junit, beside, cases
 from gates.overriders import require_in_force
 from gates.overrides import OVERRIDES
@@ -57,6 +59,9 @@ def pages_code(root: Path) -> set[int]:
 def problems_beside(root: Path, rungs: Sequence[Rung]) -> list[Problem]:
     """What blocks although every gate passes: a page, a limit that is overridden no longer.
 
+    Or one that somebody overrides in the name of another; where git knows nothing, that is
+    printed.
+
     Args:
         root: Repository root.
         rungs: The gates that are asked for, as proved.
@@ -64,7 +69,14 @@ def problems_beside(root: Path, rungs: Sequence[Rung]) -> list[Problem]:
     found = [page_problem(root)]
     proved = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
     try:
-        require_in_force(root, {gate: read_report(root, gate)[0] for gate in proved[-1:]})
+        reports = {gate: read_report(root, gate)[0] for gate in proved[-1:]}
+        require_in_force(root, reports)
+        if any(report.overrides for report in reports.values()):
+            if unknown := unknown_history(root)[0]:
+                text = f"{OVERRIDES}: who committed it is not known: the repository is {unknown}."
+                print(text, file=sys.stderr)
+            else:
+                require_said_by_themselves(root, load_allow_list(root))
     except GenpolicyError as error:
         found.append(("override", str(error), OVERRIDES, error.exit_code))
     return [problem for problem in found if problem is not None]

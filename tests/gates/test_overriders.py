@@ -1,6 +1,7 @@
 """Who may override a limit, and until when: asked of whoever acts on a report."""
 
 import datetime
+import subprocess
 from types import SimpleNamespace
 
 import evidence
@@ -9,6 +10,7 @@ import yaml
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from gates import commands
+from gates.card.signing import utc_today
 from gates.floors import LONGEST_DAYS
 from gates.overriders import first_end, require_in_force, require_written
 from gates.overrides import OVERRIDES
@@ -16,7 +18,7 @@ from gates.printed import problems_beside
 from gates.proof import Rung
 from gates.report import Overridden, report_path
 from gates.reproducibility.settings import BROUGHT_FOLDER
-from genpolicy.errors import ConfigError
+from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.evidence.documents.brought import BROUGHT
 
 LAST = datetime.date(2026, 12, 24)
@@ -169,3 +171,39 @@ def test_the_chain_is_not_green_on_an_exception_that_is_over(root, monkeypatch):
     assert (name, file, code) == ("override", OVERRIDES, 2) and "over since 2020-01-01" in text
     report.overrides = ()
     assert problems_beside(root, [rung]) == []
+
+
+@pytest.fixture
+def overridden(root, monkeypatch):
+    """A report that stands on an exception of today, which lies there."""
+    entry = {"expires": str(utc_today())}
+    _write(root, **entry)
+    report = SimpleNamespace(overrides=(_record(**entry),))
+    monkeypatch.setattr("gates.printed.page_problem", lambda root: None)
+    monkeypatch.setattr("gates.printed.read_report", lambda root, gate: (report, ""))
+    return [Rung("D", "n", "PASS", "", "", report_path("D"), 0)]
+
+
+def _git(root, *args, author="rita"):
+    named = ("-c", f"user.name={author}", "-c", f"user.email={author}@example.org")
+    subprocess.run(["git", "-C", str(root), *named, *args], check=True, capture_output=True)
+
+
+def test_the_chain_is_not_green_on_what_somebody_says_for_another(root, overridden, capsys):
+    """To write `by: rita` takes nothing; to commit it as she takes a lie."""
+    _git(root, "init", "-q")
+    ((name, text, file, code),) = problems_beside(root, overridden)
+    assert (name, file) == ("override", OVERRIDES) and "not committed as it lies here" in text
+    assert code == IntegrityError.exit_code != 0
+    _git(root, "add", "-A")
+    _git(root, "commit", "-q", "-m", "x", author="ada")
+    ((_, text, _, _),) = problems_beside(root, overridden)
+    assert "committed by ada@example.org, expected a commit of rita" in text
+    _git(root, "commit", "-q", "--amend", "--no-edit", "--reset-author")
+    assert problems_beside(root, overridden) == []
+    assert capsys.readouterr().err == ""
+
+
+def test_without_a_history_it_is_said_that_nobody_knows_who_committed_it(root, overridden, capsys):
+    assert problems_beside(root, overridden) == []
+    assert "overrides.yaml: who committed it is not known: the repos" in capsys.readouterr().err
