@@ -185,18 +185,17 @@ def judge(
         names = candidates if item.per_candidate else (None,)
         asked = (name for name in names if not settings.excepted(item.id, name))
         answers += [_answer(item, evidence, inputs, limit, name) for name in asked]
-    ruled = rule(exceptions, spec.criteria, answers, limits, candidates=spec.below is not None)
     evidence.bind(*spec.bind)
-    lacking = _lacking(evidence)
-    verdict = "INCONCLUSIVE" if lacking and ruled.verdict == "PASS" else ruled.verdict
-    judged = Judged(evidence, inputs, ruled.answers, verdict, ruled.candidates)
+    lacking, about = _lacking(evidence), spec.below is not None
+    ruled = rule(exceptions, spec.criteria, answers, limits, candidates=about, lacking=lacking)
+    judged = Judged(evidence, inputs, ruled.answers, ruled.verdict, ruled.candidates)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
     beside = (*_waivers(limits), *settings.caveats, *(spec.said(judged) if spec.said else ()))
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,
-        verdict=verdict,
+        verdict=ruled.verdict,
         candidates=ruled.candidates,
         criteria=tuple(answers),
         materials=evidence.materials,

@@ -25,7 +25,6 @@ from gates.report import (
     Answer,
     Comparison,
     Gate,
-    GateReport,
     Overridden,
     StrictModel,
     Verdict,
@@ -33,8 +32,8 @@ from gates.report import (
     read_report,
     stage_of,
 )
-from gates.settings import DERIVED, LIMITS, Limits, require_plain
-from gates.verdicts import combine, judge_criterion, margin
+from gates.settings import DERIVED, LIMITS, NOT_APPLICABLE, Limits, require_plain
+from gates.verdicts import at_most, combine, judge_criterion, margin
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -110,6 +109,9 @@ def placed(entry: Override | Overridden) -> str:
 def read_overrides(root: Path, params: Mapping[str, Any]) -> tuple[Override, ...]:
     """Every exception that is written; none where the file is missing.
 
+    A rehearsal takes the exceptions of the checkout that it rehearses, but for those to what it
+    does not ask.
+
     Args:
         root: Repository root.
         params: `params.yaml`, whose limits they are held against.
@@ -128,6 +130,10 @@ def read_overrides(root: Path, params: Mapping[str, Any]) -> tuple[Override, ...
     for number, entry in enumerate(found):
         if any(_key(entry) == _key(other) for other in found[:number]):
             _refuse(placed(entry), "overridden twice", "one entry", "Remove one of the two.")
+    if is_rehearsal(params):
+        waived = {gate: _written(params, gate, NOT_APPLICABLE) for gate in GATES}
+        found = tuple(entry for entry in found if entry.criterion not in waived[entry.gate])
+    for entry in found:
         _require_limit(entry, params)
     return found
 
@@ -156,6 +162,7 @@ def rule(
     limits: Limits,
     *,
     candidates: bool,
+    lacking: Sequence[str] = (),
 ) -> Ruled:
     """Verdicts of a gate under its exceptions, and what each of them changes.
 
@@ -165,13 +172,15 @@ def rule(
         answers: By the limits of `params.yaml`.
         limits: Those limits.
         candidates: Whether the gate is about candidates.
+        lacking: What no gate passes without, beside its criteria, with exceptions or without, and
+            is not there.
 
     Raises:
         ConfigError: An exception names a candidate where the whole gate is asked, or none where
             each of them is.
     """
     each = {item.id: item.per_candidate for item in criteria}
-    without, _ = combine(answers, expects_candidates=candidates)
+    without = at_most(combine(answers, expects_candidates=candidates)[0], lacking)
     held, overrides = list(answers), list(exceptions.below)
     for entry in exceptions.own:
         if each.get(entry.criterion) != (entry.candidate is not None):
@@ -180,23 +189,25 @@ def rule(
             _refuse(placed(entry), found, expected, CORRECT)
         own: Verdict | None = None
         instead: Verdict | None = None
+        stated, comparison = limits.of[entry.criterion].limit, comparison_of(entry.criterion)
+        threshold = entry.limit if stated is None else stated
+        looser = (max if comparison == "<=" else min)(entry.limit, threshold)
         for number, answer in enumerate(answers):
             if (answer.id, answer.candidate) == (entry.criterion, entry.candidate):
-                own, instead = answer.verdict, _looser(answer, entry.limit)
+                own, instead = answer.verdict, _looser(answer, looser)
                 held[number] = answer.model_copy(update={"verdict": instead})
-        stated = limits.of[entry.criterion].limit
         overrides.append(
             Overridden(
-                **entry.model_dump(),
-                comparison=comparison_of(entry.criterion),
-                threshold=entry.limit if stated is None else stated,
+                **{**entry.model_dump(), "limit": looser},
+                comparison=comparison,
+                threshold=threshold,
                 verdict=own,
                 instead=instead,
                 without=without,
             )
         )
     verdict, verdicts = combine(held, expects_candidates=candidates)
-    return Ruled(tuple(held), verdict, verdicts, tuple(overrides))
+    return Ruled(tuple(held), at_most(verdict, lacking), verdicts, tuple(overrides))
 
 
 def exceptions_of(root: Path, params: Mapping[str, Any], gate: Gate) -> Exceptions:
@@ -244,12 +255,6 @@ def aside(overrides: Sequence[Overridden]) -> str:
     return f"{OVERRIDDEN}: {whose}; without, {gates}."
 
 
-def overridden_here(answer: Answer, report: GateReport) -> Overridden | None:
-    """The exception that a criterion is held to; None where it counts by its own limit."""
-    key = (report.gate, answer.id, answer.candidate)
-    return next((entry for entry in report.overrides if _key(entry) == key), None)
-
-
 def comparison_of(criterion: str) -> Comparison:
     """How what is measured must stand to the limit of a criterion."""
     return ">=" if criterion in AT_LEAST else "<="
@@ -290,7 +295,7 @@ def _entry(item: Any, number: int) -> Override:
 def _require_limit(entry: Override, params: Mapping[str, Any]) -> None:
     """Require that an entry loosens a limit that counts, and not beyond what the code allows."""
     where = placed(entry)
-    stated = _limits(params, entry.gate)
+    stated = _written(params, entry.gate, LIMITS)
     if entry.criterion not in stated:
         known = ", ".join(sorted(stated)) or "none"
         _refuse(where, "no criterion with a limit there", f"one of {known}", CORRECT)
@@ -313,16 +318,16 @@ def _require_limit(entry: Override, params: Mapping[str, Any]) -> None:
                 f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
                 "This bound stands in the code, and nobody overrides it. Remove the entry.",
             )
-    # A rehearsal has looser limits, and takes the exceptions of the checkout that it rehearses.
+    # A rehearsal may have looser limits; the looser of the two counts there.
     if margin(entry.limit, limit, comparison) >= 0 and not is_rehearsal(params):
         side = "above" if comparison == "<=" else "below"
         _refuse(where, f"{entry.limit:g}", f"a number {side} the limit {limit:g}", CORRECT)
 
 
-def _limits(params: Mapping[str, Any], gate: Gate) -> dict[str, Any]:
-    """Limits of a gate as written, by criterion."""
+def _written(params: Mapping[str, Any], gate: Gate, kind: str) -> dict[str, Any]:
+    """Limits of a gate as written, or what is not applicable, by criterion."""
     section = params.get(stage_of(gate))
-    owners = section.get(LIMITS) if isinstance(section, Mapping) else None
+    owners = section.get(kind) if isinstance(section, Mapping) else None
     found: dict[str, Any] = {}
     for entries in owners.values() if isinstance(owners, Mapping) else ():
         for name, value in entries.items() if isinstance(entries, Mapping) else ():

@@ -7,7 +7,15 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.report import Answer, Comparison, GateReport, Verdict, limit_text, measured_text
+from gates.report import (
+    Answer,
+    Comparison,
+    GateReport,
+    Overridden,
+    Verdict,
+    limit_text,
+    measured_text,
+)
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
 SIGNIFICANT_DIGITS = 12
@@ -64,6 +72,11 @@ def best(verdicts: Iterable[Verdict]) -> Verdict:
     return min(verdicts, key=SEVERITY.__getitem__, default="INCONCLUSIVE")
 
 
+def at_most(verdict: Verdict, lacking: Sequence[str]) -> Verdict:
+    """Nothing passes where something lacks, beside the criteria."""
+    return "INCONCLUSIVE" if lacking and verdict == "PASS" else verdict
+
+
 def combine(
     criteria: Sequence[Answer], *, expects_candidates: bool
 ) -> tuple[Verdict, dict[str, Verdict]]:
@@ -116,10 +129,22 @@ def decided_text(report: GateReport) -> str:
 
 
 def counting(report: GateReport) -> list[Answer]:
-    """Criteria by which the verdict is found: without those that hold by a looser limit only."""
-    spared = {
-        (entry.criterion, entry.candidate)
-        for entry in report.overrides
-        if entry.gate == report.gate and entry.instead == "PASS"
-    }
-    return [c for c in report.criteria if c.verdict == "PASS" or (c.id, c.candidate) not in spared]
+    """Criteria by which the verdict is found, each with the verdict that counts.
+
+    Left out is what holds by a looser limit only; what is not decided by it counts as such.
+    """
+    found = []
+    for answer in report.criteria:
+        entry = overridden_here(answer, report)
+        instead = answer.verdict if entry is None or entry.instead is None else entry.instead
+        if answer.verdict == "PASS" or instead != "PASS":
+            kept = instead == answer.verdict
+            found.append(answer if kept else answer.model_copy(update={"verdict": instead}))
+    return found
+
+
+def overridden_here(answer: Answer, report: GateReport) -> Overridden | None:
+    """The exception that a criterion is held to; None where it counts by its own limit."""
+    key = (report.gate, answer.id, answer.candidate)
+    own = (one for one in report.overrides if (one.gate, one.criterion, one.candidate) == key)
+    return next(own, None)

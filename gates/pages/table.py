@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from gates.overrides import overridden_here
 from gates.pages.numbers import human, limit_said
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
-from gates.verdicts import counting, decided_by
+from gates.verdicts import counting, decided_by, overridden_here
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,6 @@ from gates.overrides import (
     Override,
     comparison_of,
     exceptions_of,
-    overridden_here,
     read_overrides,
     rule,
     said,
@@ -30,7 +29,7 @@ from gates.pages.summary import markdown
 from gates.proof import SPECS, judge, verify_report
 from gates.report import Answer, read_report, report_bytes, report_path
 from gates.settings import Limit, Limits, read_limits, read_params
-from gates.verdicts import counting, decided_by
+from gates.verdicts import counting, decided_by, overridden_here
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.atomic import write_bytes
 
@@ -131,6 +130,34 @@ def test_a_rehearsal_with_looser_limits_takes_the_exceptions_of_its_checkout(tmp
         _read(tmp_path, ENTRY, params={**params, "rehearsal": False})
 
 
+def test_a_rehearsal_leaves_out_exceptions_to_what_it_does_not_ask(tmp_path):
+    params = copy.deepcopy({**evidence.PARAMS, "rehearsal": True})
+    owner = next(o for o, own in params["gate_d"]["limits"].items() if "hold_share_upper" in own)
+    del params["gate_d"]["limits"][owner]["hold_share_upper"]
+    params["gate_d"]["not_applicable"] = {owner: {"hold_share_upper": "too few starts"}}
+    other = {**ENTRY, "criterion": "reset_upper", "limit": 0.09}
+    assert [entry.criterion for entry in _read(tmp_path, ENTRY, other, params=params)] == [
+        "reset_upper"
+    ]
+    with pytest.raises(ConfigError, match="no criterion with a limit"):
+        _read(tmp_path, {**ENTRY, "criterion": "hold_share"}, params=params)
+
+
+def test_the_looser_of_the_two_limits_counts_in_a_rehearsal():
+    ruled = _rule({"limit": 0.03}, _answer("INCONCLUSIVE", 0.05, interval=(0.035, 0.05)))
+    assert ruled.answers[0].verdict == "INCONCLUSIVE", "by 0.04, not FAIL by the stricter 0.03"
+    assert (ruled.overrides[0].limit, ruled.overrides[0].threshold) == (0.04, 0.04)
+
+
+def test_what_lacks_beside_the_criteria_lacks_without_the_exception_too():
+    for answer in (_answer("PASS", measured=0.01), _answer("FAIL")):
+        ruled = _rule({"limit": 0.06}, answer, lacking=["task"])
+        assert ruled.verdict == "INCONCLUSIVE"
+        assert ruled.overrides[0].without == {"PASS": "INCONCLUSIVE"}.get(
+            answer.verdict, answer.verdict
+        )
+
+
 def test_a_limit_is_overridden_once(tmp_path):
     with pytest.raises(ConfigError, match="overridden twice"):
         _read(tmp_path, ENTRY, {**ENTRY, "by": "mo"})
@@ -176,10 +203,12 @@ def _answer(verdict, measured=0.05, interval=None, candidate="flow", name="hold_
     )  # fmt: skip
 
 
-def _rule(entry, *answers):
+def _rule(entry, *answers, lacking=()):
     limits = Limits(of={"hold_share_upper": Limit(0.04, "r", "safety")})
     own = (Override(**{**ENTRY, **entry}),)
-    return rule(Exceptions(own), SPECS["D"].criteria, answers, limits, candidates=True)
+    return rule(
+        Exceptions(own), SPECS["D"].criteria, answers, limits, candidates=True, lacking=lacking
+    )
 
 
 @pytest.mark.parametrize(

@@ -171,3 +171,17 @@ def test_what_is_overridden_decides_nothing_if_it_holds_so_and_is_of_this_gate(
     assert decided_text(report).startswith("second" if spared else "first")
     report.verdict = "PASS"
     assert decided_by(report) is None
+
+
+def test_what_its_looser_limit_does_not_decide_decides_as_what_it_is_then():
+    """Else nothing has the verdict of the report, and something else is named."""
+    rows = (criterion("FAIL", None, "first"), criterion("INCONCLUSIVE", None, "second"))
+    entry = Overridden(
+        gate="A", criterion="first", candidate=None, comparison="<=", threshold=1.0, limit=2.0,
+        by="rita", reason="r", expires="2026-12-24", verdict="FAIL", instead="INCONCLUSIVE",
+        without="FAIL",
+    )  # fmt: skip
+    report = SimpleNamespace(gate="A", verdict="INCONCLUSIVE", criteria=rows, overrides=(entry,))
+    assert [c.verdict for c in counting(report)] == ["INCONCLUSIVE"] * 2
+    assert decided_by(report).id == "first"
+    assert rows[0].verdict == "FAIL", "its own verdict stays"
