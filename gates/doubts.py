@@ -28,6 +28,7 @@ from gates.report import GateReport
 from gates.settings import WAIVED
 from gates.stress.clocks import DIFFER, UNSEEN
 from gates.stress.contact import UNTOUCHED
+from gates.verdicts import counting
 
 OF_ALL = {
     REHEARSED: "a rehearsal",
@@ -121,7 +122,7 @@ def _not_decided(report: GateReport) -> Iterator[Doubt]:
 def _stopped(report: GateReport) -> Iterator[Doubt]:
     """A candidate that fails beside one that passes: whoever chooses knows what fell away."""
     for name, verdict in sorted(report.candidates.items()):
-        broken = [c for c in report.criteria if c.candidate == name and c.verdict == "FAIL"]
+        broken = [c for c in counting(report) if c.candidate == name and c.verdict == "FAIL"]
         if verdict == "FAIL" and report.verdict == "PASS":
             ids = tuple(c.id for c in broken)
             yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(ids)}", ids)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from gates.overrides import OVERRIDDEN, OVERRIDES, said
 from gates.proof import Rung
 from gates.report import Answer, Gate, GateReport, limit_text, measured_text
+from gates.verdicts import counting
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class ListedTest:
         text: One line for a reader.
         file: Where it stands, relative to the repository.
         blocks: Whether it keeps the ladder from passing. What stopped a candidate beside one that
-            passes does not.
+            passes does not, nor what holds by the limit of an exception.
     """
 
     gate: str
@@ -95,13 +96,18 @@ def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
         yield ListedTest(rung.gate, "report", rung.verdict, rung.note, rung.report, blocks=True)
         return
     for entry in report.overrides:
-        name = f"overridden: {entry.criterion}"
+        of = f" ({entry.candidate})" if entry.candidate else ""
+        name = f"overridden at gate {entry.gate}: {entry.criterion}{of}"
         yield ListedTest(rung.gate, name, OVERRIDDEN, said(entry), OVERRIDES, blocks=False)
-    passes = rung.verdict == "PASS"
+    stand = {(one.id, one.candidate) for one in counting(report) if one.verdict != "PASS"}
     for answer in report.criteria:
         name = f"{answer.id} ({answer.candidate})" if answer.candidate else answer.id
-        blocks = answer.verdict != "PASS" and not passes
+        broken = answer.verdict != "PASS" and (answer.id, answer.candidate) in stand
+        blocks = broken and rung.verdict != "PASS"
         yield ListedTest(rung.gate, name, answer.verdict, _text(answer), rung.report, blocks)
+    if rung.verdict != "PASS" and not stand:  # something else lacks, and keeps it from passing
+        text = report.diagnosis or report.decision
+        yield ListedTest(rung.gate, "report", rung.verdict, text, rung.report, blocks=True)
 
 
 def _text(answer: Answer) -> str:

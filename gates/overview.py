@@ -15,6 +15,7 @@ import typer
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
 from gates.report import limit_text, measured_text, read_report, stage_of
+from gates.verdicts import counting
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
@@ -83,7 +84,7 @@ def _stopped(root: Path, rung: Rung) -> Iterator[str]:
         return
     report = read_report(root, rung.gate)[0]
     for name, verdict in sorted(report.candidates.items()):
-        unmet = [c for c in report.criteria if c.candidate == name and c.verdict == verdict]
+        unmet = [c for c in counting(report) if c.candidate == name and c.verdict == verdict]
         if verdict != "PASS" and unmet:
             held = f"{measured_text(unmet[0])}, required {limit_text(unmet[0])}"
             yield f"{name} {verdict}: {unmet[0].id} {held}"

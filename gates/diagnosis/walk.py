@@ -7,8 +7,10 @@ from typing import Literal
 from gates.criterion import Criterion
 from gates.diagnosis.places import PLACES, place_of
 from gates.diagnosis.reports import OF_EVIDENCE, Reports
+from gates.overrides import OVERRIDDEN
 from gates.proof import SPECS
-from gates.report import Answer, Gate, limit_text, measured_text
+from gates.report import Answer, Gate, GateReport, limit_text, measured_text
+from gates.verdicts import overridden_here
 
 State = Literal["in order", "in order so far", "not asked", "not decided", "RED"]
 STOPS: tuple[State, ...] = ("RED", "not decided")
@@ -24,7 +26,8 @@ class Stop:
             where the rest waits for a gate that is not judged, or was not asked of a candidate that
             is unmatched by exception; `not asked` where nothing was answered.
         asked: Criteria that were answered.
-        unmet: Those that do not hold, as sentences: what was measured, the limit, where to look.
+        unmet: Those that do not hold, as sentences: what was measured, the limit, who overrides
+            it, where to look.
         waits_for: Why some criteria have no answer yet.
         not_asked: What was waived or excepted, by whose word and why.
     """
@@ -98,7 +101,7 @@ def _look(reports: Reports, candidate: str, place: str) -> Stop:
     left_out = tuple(text for name in names for text in reports.not_asked(name, candidate))
     partly = bool(waits) or any(reports.is_excepted(name, candidate) for name in names)
     state = _state(bool(red), bool(unmet), len(answers), partly)
-    return Stop(place, state, len(answers), _sentences(unmet), tuple(waits), left_out)
+    return Stop(place, state, len(answers), _sentences(reports, unmet), tuple(waits), left_out)
 
 
 def _state(red: bool, unmet: bool, asked: int, partly: bool) -> State:
@@ -111,9 +114,20 @@ def _state(red: bool, unmet: bool, asked: int, partly: bool) -> State:
     return "in order"
 
 
-def _sentences(unmet: Sequence[tuple[Gate, Criterion, Answer]]) -> tuple[str, ...]:
+def _sentences(
+    reports: Reports, unmet: Sequence[tuple[Gate, Criterion, Answer]]
+) -> tuple[str, ...]:
     return tuple(
         f"{answer.id} (gate {gate}): {measured_text(answer)}, required {limit_text(answer)}. "
-        f"{item.look_at}"
+        f"{_overridden(answer, reports.judged[gate])}{item.look_at}"
         for gate, item, answer in unmet
     )
+
+
+def _overridden(answer: Answer, report: GateReport) -> str:
+    """Who let it be looser at its gate: it stays broken, and is where to look."""
+    entry = overridden_here(answer, report)
+    if entry is None:
+        return ""
+    held = f"{entry.comparison} {entry.limit:.6g}"
+    return f"{OVERRIDDEN} by {entry.by} until {entry.expires}: {entry.instead} by {held}. "

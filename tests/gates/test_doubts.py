@@ -10,6 +10,7 @@ from gates.card.signing import read_draft
 from gates.doubt import Doubt
 from gates.doubts import OF_ALL, doubts_of, for_a_card, of_a_ladder
 from gates.proof import judge
+from gates.report import Overridden
 
 
 def kinds(report):
@@ -222,3 +223,23 @@ def test_clocks_that_differ_are_no_general_caveat(reports, said, weighed):
     first, rest = of_a_ladder([report])
     assert [doubt.text for doubt in first if doubt.kind == "two clocks"] == [said] * weighed
     assert [doubt.text for doubt in rest] == [said] * (not weighed)
+
+
+def test_who_holds_by_an_exception_did_not_fall_by_it():
+    """What stopped a candidate is what counts: the exception is said by itself."""
+    rows = tuple(criterion("FAIL", "flow", name) for name in ("excepted", "broken"))
+    entry = Overridden(
+        gate=REPORT.gate, criterion="excepted", candidate="flow", comparison="<=", threshold=1.0,
+        limit=2.0, by="rita", reason="r", expires="2026-12-24", verdict="FAIL", instead="PASS",
+        without="FAIL",
+    )  # fmt: skip
+    report = REPORT.model_copy(
+        update={
+            "verdict": "PASS",
+            "criteria": rows,
+            "candidates": {"flow": "FAIL"},
+            "overrides": (entry,),
+        }  # fmt: skip
+    )
+    (fell,) = [doubt for doubt in doubts_of(report) if doubt.kind == "stopped here"]
+    assert fell.text == "flow: broken"

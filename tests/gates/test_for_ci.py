@@ -7,6 +7,7 @@ from test_verdicts import criterion
 
 from gates.for_ci import as_github, as_junit, beside, cases
 from gates.proof import Rung
+from gates.report import Overridden
 
 
 def rung(verdict, note=""):
@@ -106,3 +107,40 @@ def test_golden_what_both_machines_are_told():
         "::error file=reports/gate_b.json,title=Gate B%2C report%3A NOT JUDGED::no report",
         "::error file=p.html,title=Beside the gates%2C page%3A REFUSED::another",
     ]
+
+
+def _overridden(**changes):
+    values = {
+        "gate": "A", "criterion": "x", "candidate": None, "comparison": "<=", "threshold": 1.0,
+        "limit": 2.0, "by": "rita", "reason": "r", "expires": "2026-12-24", "verdict": "FAIL",
+        "instead": "PASS", "without": "FAIL",
+    }  # fmt: skip
+    return Overridden(**{**values, **changes})
+
+
+def test_what_holds_by_an_exception_blocks_nothing_and_what_else_fails_does():
+    other = criterion("FAIL").model_copy(update={"id": "other"})
+    held = report(criterion("FAIL"), other)
+    held["A"] = held["A"].model_copy(update={"overrides": (_overridden(),)})
+    found = cases([rung("FAIL")], held)
+    assert {c.name: c.blocks for c in found} == {
+        "overridden at gate A: x": False, "x": False, "other": True,
+    }  # fmt: skip
+
+
+def test_a_gate_that_something_beside_its_criteria_keeps_from_passing_is_red():
+    held = report(criterion("FAIL"))
+    held["A"] = held["A"].model_copy(
+        update={"overrides": (_overridden(),), "diagnosis": "No criterion decided."}
+    )
+    *_, last = cases([rung("INCONCLUSIVE")], held)
+    assert (last.name, last.text, last.blocks) == ("report", "No criterion decided.", True)
+
+
+def test_each_exception_is_a_test_of_its_own():
+    entries = tuple(
+        _overridden(gate=gate, candidate=who) for gate in "AB" for who in (None, "flow", "act")
+    )
+    held = {"A": REPORT.model_copy(update={"criteria": (), "overrides": entries})}
+    names = [case.name for case in cases([rung("PASS")], held)]
+    assert len(set(names)) == 6 and "overridden at gate B: x (flow)" in names

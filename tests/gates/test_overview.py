@@ -5,14 +5,16 @@ import json
 import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import evidence
 import pytest
 import yaml
+from test_verdicts import criterion
 
-from gates.overview import Line, as_text, overview
+from gates.overview import Line, _stopped, as_text, overview
 from gates.present import present_runs
-from gates.proof import STAGE_REQUIRES, judge, prove_all
+from gates.proof import STAGE_REQUIRES, Rung, judge, prove_all
 from gates.report import report_bytes, report_path
 from genpolicy.integrity.atomic import write_bytes
 
@@ -174,6 +176,17 @@ def test_who_fell_is_named_with_number_and_limit_where_another_passes(ladder: Pa
     assert lines["gate_d"].verdict == "PASS"
     assert lines["gate_d"].stopped == ("diffusion FAIL: latency_p95_s 9, required <= 0.4",)
     assert lines["gate_c"].stopped == ()
+
+
+def test_who_fell_did_not_fall_by_what_is_overridden(monkeypatch) -> None:
+    rows = tuple(criterion("FAIL", "flow", name) for name in ("excepted", "broken"))
+    entry = SimpleNamespace(gate="D", criterion="excepted", candidate="flow", instead="PASS")
+    report = SimpleNamespace(
+        gate="D", criteria=rows, candidates={"flow": "FAIL"}, overrides=(entry,)
+    )
+    monkeypatch.setattr("gates.overview.read_report", lambda root, gate: (report, ""))
+    (text,) = _stopped(Path(), Rung("D", "n", "PASS", "", "", "", 0))
+    assert text.startswith("flow FAIL: broken 1")
 
 
 def test_a_report_that_is_refused_does_not_say_who_fell(ladder: Path) -> None:

@@ -9,6 +9,7 @@ from causes_planted import FLOW
 from gates.diagnosis.places import PLACES
 from gates.diagnosis.reports import EVERYBODY
 from gates.diagnosis.walk import criteria_at, walk
+from gates.report import Overridden
 
 
 def turned(reports, name, verdict, candidate=None):
@@ -118,3 +119,22 @@ def test_a_real_defect_is_found_by_the_real_gates(planted):
 
     found = walk(planted(edit, "A"), FLOW)
     assert found.ended_at.place == "data semantics" and len(found.stops) == 1
+
+
+def test_a_stop_that_somebody_overrides_says_so_and_is_still_where_to_look(honest):
+    place = next(place for place in PLACES if criteria_at(place))
+    gate, item = criteria_at(place)[0]
+    candidate = FLOW if item.per_candidate else None
+    reports = turned(honest, f"{gate}.{item.id}", "FAIL", candidate)
+    entry = Overridden(
+        gate=gate, criterion=item.id, candidate=candidate, comparison="<=", threshold=1.0,
+        limit=2.0, by="rita", reason="r", expires="2026-12-24", verdict="FAIL", instead="PASS",
+        without="FAIL",
+    )  # fmt: skip
+    held = reports.judged[gate].model_copy(update={"overrides": (entry,)})
+    stop = walk(replace(reports, judged={**reports.judged, gate: held}), FLOW).stops[-1]
+    assert (stop.place, stop.state) == (place, "RED")
+    (text,) = stop.unmet
+    assert "OVERRIDDEN by rita until 2026-12-24: PASS by <= 2. " in text
+    assert text.endswith(item.look_at)
+    assert "OVERRIDDEN" not in walk(reports, FLOW).stops[-1].unmet[0]
