@@ -1,9 +1,9 @@
 """What a gate said of a candidate, as an in-toto statement: who it is about, and on what it rests.
 
 Subjects are the candidate's checkpoint (the dataset at Gate A, where no candidate exists yet) and
-the report; the predicate names everything that the report names by hash. Form: in-toto Statement
-v1 (`_type`, `subject`, `predicateType`, `predicate`). It is not signed: whoever has the bundle
-derives it again, and people sign the trial card.
+the report; the predicate names everything that the report names by hash, and who overrides what.
+Form: in-toto Statement v1 (`_type`, `subject`, `predicateType`, `predicate`). It is not signed:
+whoever has the bundle derives it again, and people sign the trial card.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from gates.report import Gate, GateReport, report_path
 
 STATEMENT_TYPE = "https://in-toto.io/Statement/v1"
-PREDICATE_TYPE = "urn:genpolicy:gate-verdict:1"
+PREDICATE_TYPE = "urn:genpolicy:gate-verdict:2"
 DATASET = "artifacts/ingest/manifest.json"
 
 
@@ -48,6 +48,7 @@ def statement_of(
             "pipeline": report.pipeline,
             "environment": report.environment,
             "caveats": list(report.caveats),
+            "overrides": [entry.model_dump(mode="json") for entry in report.overrides],
         },
     }
 

@@ -239,7 +239,7 @@ def test_who_holds_by_an_exception_did_not_fall_by_it():
             "criteria": rows,
             "candidates": {"flow": "FAIL"},
             "overrides": (entry,),
-        }  # fmt: skip
+        }
     )
     (fell,) = [doubt for doubt in doubts_of(report) if doubt.kind == "stopped here"]
     assert fell.text == "flow: broken"

@@ -3,7 +3,7 @@
 import pytest
 
 from gates.package.statements import statement_of, statement_path
-from gates.report import read_report
+from gates.report import Overridden, read_report
 
 
 def of(ladder, gate, candidate="flow"):
@@ -36,6 +36,22 @@ def test_it_names_the_report_and_all_that_the_report_names(ladder):
     assert predicate["materials"] == report.materials and report.materials
     assert predicate["upstream"] == report.upstream and predicate["code"] == report.code
     assert predicate["caveats"] == list(report.caveats)
+
+
+def test_it_carries_every_exception_as_data(ladder):
+    """By fields, so that a machine need not read the caveats to see what a PASS stands on."""
+    report, digest = read_report(ladder, "D")
+    entry = Overridden(
+        gate="C", criterion="x", candidate=None, comparison="<=", threshold=1.0, limit=2.0,
+        by="rita", reason="r", expires="2026-12-24", verdict="FAIL", instead="PASS",
+        without="FAIL",
+    )  # fmt: skip
+    held = report.model_copy(update={"overrides": (entry,)})
+    named = {"digest": digest, "candidate": "flow", "checkpoint": "c" * 64, "dataset": "d" * 64}
+    found = statement_of(held, **named)
+    assert found["predicate"]["overrides"] == [entry.model_dump(mode="json")]
+    assert found["predicateType"] == "urn:genpolicy:gate-verdict:2"
+    assert statement_of(report, **named)["predicate"]["overrides"] == []
 
 
 def test_it_says_the_verdict_of_this_candidate(ladder):
