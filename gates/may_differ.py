@@ -4,6 +4,11 @@ Training writes down every setting in which a method differs from the reference 
 them (`matched.json`). Gates A and B hold that against one list; what differs and is not on it is a
 comparison with other settings. What a gain would be a gain of, if it differed, is never on the
 list, whatever reason is given.
+
+Two things are not caught here. The training leaves out of `matched.json` what a method is by
+definition (`genpolicy.policies.matched_training`): `horizons` and `dimensions.prediction_horizon`
+of who predicts one action, `provenance.episodes_sha256` of who learns one mode. And the rest of
+`training`, as a learning rate, may differ between methods where somebody writes down why.
 """
 
 from collections.abc import Mapping, Sequence

@@ -170,7 +170,7 @@ def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[
         elif stated != side:
             found.append(Move(place, f"{stated} {before}", f"{side} {now[place]}", "changed"))
         elif now[place] != before:
-            found.append(Move(place, before, now[place], _kind(side, before, now[place])))
+            found.append(Move(place, before, now[place], _kind_at(place, before, now[place])))
     return found + [Move(p, None, now[p], "changed") for p in now if p not in plan]
 
 
@@ -230,6 +230,16 @@ def moved_caveats(root: Path, params: Mapping[str, Any], gate: Gate) -> tuple[st
 @functools.lru_cache
 def _parsed(data: bytes) -> Any:
     return parse_yaml(data, where=PREREGISTRATION)
+
+
+def _kind_at(place: str, before: object, now: object) -> Kind:
+    """As `_kind`; of what may differ, more settings are looser and fewer tighter."""
+    if place != PLACE or not (isinstance(before, list) and isinstance(now, list)):
+        return _kind(_side(place), before, now)
+    keys, ours = (
+        {str(one[:1]) for one in listed if isinstance(one, list)} for listed in (before, now)
+    )
+    return "loosened" if ours > keys else "tightened" if ours < keys else "changed"
 
 
 def _kind(comparison: str, before: object, now: object) -> Kind:

@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from gates.cause.limits import OWN
+from gates.may_differ import PLACE
 from gates.preregistration import (
     CAUSE_STRICT,
     NONE,
@@ -305,3 +306,23 @@ def test_the_shipped_plan_can_be_read(request):
     assert plan is not None
     text = plan_bytes(yaml.safe_load((request.config.rootpath / "params.yaml").read_text()))
     assert set(yaml.safe_load(text)) >= {"stress.margin", "gate_d.stub_violations"}
+
+
+@pytest.mark.parametrize(
+    ("now", "kind"),
+    [
+        ([["a", "r"], ["b", "r"], ["c", "r"]], "loosened"),
+        ([["b", "r"]], "tightened"),
+        ([], "tightened"),
+        ([["a", "r"], ["c", "r"]], "changed"),
+        ([["a", "another reason"], ["b", "r"]], "changed"),
+        (None, "changed"),
+    ],
+)
+def test_a_list_of_what_may_differ_is_looser_by_each_setting_on_it(now, kind):
+    params = copy.deepcopy(evidence.PARAMS)
+    params["comparison"] = {"may_differ": [["a", "r"], ["b", "r"]]}
+    plan = plan_of(params)
+    params["comparison"]["may_differ"] = now
+    (move,) = moves(plan, params)
+    assert (move.place, move.kind) == (PLACE, kind)
