@@ -252,7 +252,7 @@ def _is_same(scoring: Scoring, one: _Seen, chunks: Array) -> bool:
             where=f"{scoring.judged.name}: {one.condition}, start {one.start}",
             found=f"another chunk than was drawn by invocation {one.number}",
             expected="the same from the same observations and noise",
-            action="Run `dvc repro stress` on one machine.",
+            action="Run `dvc repro monitors` on the machine that ran stress.",
         )
     return same
 
