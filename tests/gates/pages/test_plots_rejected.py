@@ -184,6 +184,8 @@ def test_a_person_reads_nine_pixels_on_a_narrow_page():
 
 def test_the_page_shows_each_example_with_its_text(whole, judged):
     html = gate_page(whole, judged("C"))
-    found = re.findall(r'<div class="small"><h4>([^<]*)</h4><div class="plot"[^>]*><svg role="img"', html)
+    found = re.findall(
+        r'<div class="small"><h4>([^<]*)</h4><div class="plot"[^>]*><svg role="img"', html
+    )
     assert found == [f"{method}: joint jerk" for method in evidence.CANDIDATES]
     assert "limit of a joint: 5,730 to 11,500°/s³." in html
