@@ -51,7 +51,7 @@ def test_each_gate_writes_its_verdict_numbers_and_table(evidence, stage) -> None
 def test_judging_twice_gives_the_same_bytes(evidence, stage) -> None:
     judge(stage, "gate_a")
     first = {p: p.read_bytes() for p in evidence.rglob("*gate_a*/*") if p.is_file()}
-    first |= {p: p.read_bytes() for p in (evidence / "reports").iterdir()}
+    first |= {p: p.read_bytes() for p in (evidence / "reports").rglob("*") if p.is_file()}
     judge(stage, "gate_a")
     assert {p: p.read_bytes() for p in first} == first
 
