@@ -12,7 +12,7 @@ from gates import rederive
 from gates.card.card import DRAFT_PATH, read_card
 from gates.card.drafting import draft
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope
-from gates.card.history import _evidence_digests
+from gates.card.history import evidence_digests
 from gates.card.people import load_allow_list
 from gates.cause.reading import folder_numbers
 from gates.engine import judge_gate
@@ -98,7 +98,7 @@ READERS = {
     "record": lambda root: check_record(root, "C", {}),
     "pages": lambda root: changed_pages(root, "C"),
     "present": present_runs,
-    "digest": _evidence_digests,
+    "digest": evidence_digests,
 }
 
 
