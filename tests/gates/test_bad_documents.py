@@ -3,6 +3,7 @@
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import evidence
 import pytest
@@ -46,7 +47,9 @@ def edited(whole):
         kept[path] = path.read_bytes() if path.is_file() else None
 
         def changed(document):
-            path.write_bytes(canonical_json(document))
+            # JSON writes 1e-05, which YAML reads as a text.
+            written = yaml.safe_dump(document).encode() if path.suffix == ".yaml" else None
+            path.write_bytes(written or canonical_json(document))
             read()
 
         return changed
@@ -74,7 +77,7 @@ def test_parameters_of_every_gate(fallen_over, tmp_path):
 
 def test_parameters_that_journals_are_held_to(fallen_over, monkeypatch):
     for name in ("load_task", "cell_of", "expected_motion"):
-        monkeypatch.setattr(rederive, name, lambda *given, **named: None)
+        monkeypatch.setattr(rederive, name, lambda *given, **named: SimpleNamespace(action_at=None))
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
     few = {name: params[name] for name in ("horizons", "execution", "feasibility", "task")}
     rederive._held_to(few)
