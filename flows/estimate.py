@@ -8,9 +8,9 @@ from pathlib import Path
 
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json, read_yaml
+from genpolicy.outputs import PIPELINE, TIMES
 from genpolicy.progress import duration
 
-TIMES = Path("build/times")
 DOCUMENTED = (
     "nothing has run here. On two cores the default ladder takes about an hour up to gate A, "
     "`make smoke` 7 to 17 min for all gates (docs/troubleshooting.md)"
@@ -23,7 +23,7 @@ def estimate(workspace: Path) -> str:
     Args:
         workspace: Folder with `dvc.yaml`; what cannot be read is left to DVC to refuse.
     """
-    stages = _stages(workspace / "dvc.yaml")
+    stages = _stages(workspace / PIPELINE)
     taken = [_taken_s(workspace / TIMES / f"{stage}.json") for stage in stages]
     known = [seconds for seconds in taken if seconds is not None]
     if not known:

@@ -8,6 +8,7 @@ hash of that evidence into `dvc.lock`: the order of commits is known, the hour o
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +94,9 @@ def control_of(root: Path) -> Control:
         return Control(unknown, (), (), said)
     known = evidence_digests(root) if (root / LOCK).is_file() else {}
     dated = {stage: commits_of(root, known[stage]) for stage in MEASURED if known.get(stage)}
+    behind = {commit: _ancestors(root, commit) for commit in {*chain(*dated.values())}}
     older = {
-        stage: set.intersection(*(_ancestors(root, commit) for commit in commits))
+        stage: set.intersection(*(behind[commit] for commit in commits))
         for stage, commits in dated.items()
         if commits
     }

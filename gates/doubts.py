@@ -21,14 +21,14 @@ from gates.doubts_of_evidence import (
     one_seed,
     untried,
 )
-from gates.overrides import OVERRIDDEN
+from gates.overrides import is_said
 from gates.preregistration import PREREGISTRATION
 from gates.protection import REHEARSED
 from gates.report import GateReport
 from gates.settings import WAIVED
 from gates.stress.clocks import DIFFER, UNSEEN
 from gates.stress.contact import UNTOUCHED
-from gates.verdicts import counting
+from gates.verdicts import stopping
 
 OF_ALL = {
     REHEARSED: "a rehearsal",
@@ -78,11 +78,7 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
         if any(sign in doubt.text for sign in CLOCKS)
     ]
     waived = [replace(doubt, kind="not asked") for doubt in others if WAIVED.match(doubt.text)]
-    overridden = [
-        replace(doubt, kind="overridden")
-        for doubt in others
-        if doubt.text.startswith(f"{OVERRIDDEN} ")
-    ]
+    overridden = [replace(doubt, kind="overridden") for doubt in others if is_said(doubt.text)]
     said = {doubt.text for doubt in (*waived, *clocks, *overridden)}
     return overridden + first + waived + clocks + weighed, [
         one for one in others if one.text not in said
@@ -121,9 +117,8 @@ def _not_decided(report: GateReport) -> Iterator[Doubt]:
 
 def _stopped(report: GateReport) -> Iterator[Doubt]:
     """A candidate that fails beside one that passes: whoever chooses knows what fell away."""
-    for name, verdict in sorted(report.candidates.items()):
-        broken = [c for c in counting(report) if c.candidate == name and c.verdict == "FAIL"]
-        if verdict == "FAIL" and report.verdict == "PASS":
+    for name, broken in sorted(stopping(report).items()):
+        if report.candidates[name] == "FAIL" and report.verdict == "PASS":
             ids = tuple(c.id for c in broken)
             yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(ids)}", ids)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from gates.overrides import OVERRIDDEN
+from gates.overrides import OVERRIDDEN, is_said
 from gates.report import GATES, NAMES, Answer, Gate, GateReport, limit_text, measured_text
 
 NOT_JUDGED = "NOT JUDGED"
@@ -96,7 +96,7 @@ def moved_text(gates: list[Moved]) -> str:
 
 def _label(caveat: str) -> str:
     """What a caveat is about: an exception to a limit stands out among the others."""
-    return OVERRIDDEN if caveat[2:].startswith(f"{OVERRIDDEN} ") else "caveat"
+    return OVERRIDDEN if is_said(caveat[2:]) else "caveat"
 
 
 def _of_gate(gate: Gate, old: GateReport | None, new: GateReport | None) -> Moved:

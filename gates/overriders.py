@@ -67,7 +67,7 @@ def _require(
         return
     day = today or utc_today()
     allowed, authors = load_allow_list(root), _authors(root)
-    brought = _brought(root)
+    brought = made_by(root)
     for entry in entries:
         left = (datetime.date.fromisoformat(entry.expires) - day).days
         if left > LONGEST_DAYS:
@@ -107,9 +107,10 @@ def _unfit(
         return f"{person.id}, an author"
     if person.role == SPOTTER:
         return f"{person.id}, a spotter"
-    own = {mail.casefold() for mail in person.emails}
     made = sorted(
-        name for name, mail in brought.items() if mail in own and entry.candidate in (None, name)
+        name
+        for name, mail in brought.items()
+        if mail in person.mails and entry.candidate in (None, name)
     )
     return f"{person.id}, who made {made[0]}" if made else ""
 
@@ -121,7 +122,7 @@ def _authors(root: Path) -> tuple[str, ...]:
     return tuple(map(str, named)) if isinstance(named, list) else ()
 
 
-def _brought(root: Path) -> dict[str, str]:
+def made_by(root: Path) -> dict[str, str]:
     """Address of whoever made each candidate that was brought."""
     folder = root / BROUGHT_FOLDER
     found = BROUGHT.read(folder) if (folder / BROUGHT.file).is_file() else {}

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, NoReturn
 from gates.card.names import says
 from gates.criterion import Criterion
 from gates.floors import BOUNDS
-from gates.preregistration import AT_LEAST
+from gates.preregistration import AT_LEAST, at, by_criterion
 from gates.protection import is_rehearsal
 from gates.report import (
     GATES,
@@ -227,6 +227,11 @@ def exceptions_of(root: Path, params: Mapping[str, Any], gate: Gate) -> Exceptio
         return Exceptions(own)
 
 
+def is_said(caveat: str) -> bool:
+    """Whether a caveat speaks of an exception, as `said` does."""
+    return caveat.startswith(f"{OVERRIDDEN} ")
+
+
 def said(entry: Overridden) -> str:
     """What every report says of an exception, in the same words."""
     of = f" of {entry.candidate}" if entry.candidate else ""
@@ -326,13 +331,7 @@ def _require_limit(entry: Override, params: Mapping[str, Any]) -> None:
 
 def _written(params: Mapping[str, Any], gate: Gate, kind: str) -> dict[str, Any]:
     """Limits of a gate as written, or what is not applicable, by criterion."""
-    section = params.get(stage_of(gate))
-    owners = section.get(kind) if isinstance(section, Mapping) else None
-    found: dict[str, Any] = {}
-    for entries in owners.values() if isinstance(owners, Mapping) else ():
-        for name, value in entries.items() if isinstance(entries, Mapping) else ():
-            found[name] = value[0] if isinstance(value, list) and value else value
-    return found
+    return by_criterion(at(params, f"{stage_of(gate)}.{kind}"))
 
 
 def _candidates(params: Mapping[str, Any]) -> set[str]:

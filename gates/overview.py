@@ -15,7 +15,7 @@ import typer
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
 from gates.report import limit_text, measured_text, read_report, stage_of
-from gates.verdicts import counting
+from gates.verdicts import stopping
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
@@ -83,11 +83,10 @@ def _stopped(root: Path, rung: Rung) -> Iterator[str]:
     if rung.verdict in ("NOT JUDGED", "REFUSED"):
         return
     report = read_report(root, rung.gate)[0]
-    for name, verdict in sorted(report.candidates.items()):
-        unmet = [c for c in counting(report) if c.candidate == name and c.verdict == verdict]
-        if verdict != "PASS" and unmet:
+    for name, unmet in sorted(stopping(report).items()):
+        if unmet:
             held = f"{measured_text(unmet[0])}, required {limit_text(unmet[0])}"
-            yield f"{name} {verdict}: {unmet[0].id} {held}"
+            yield f"{name} {unmet[0].verdict}: {unmet[0].id} {held}"
 
 
 def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) -> str:

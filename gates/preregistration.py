@@ -176,7 +176,7 @@ def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[
 
 def _now(params: Mapping[str, Any]) -> dict[str, Any]:
     """All that a plan names, by its place."""
-    planned = {place: _at(params, place) for place in PLANNED}
+    planned = {place: at(params, place) for place in PLANNED}
     return {**planned, **_all_settings(params), **_all_limits(params)}
 
 
@@ -292,13 +292,15 @@ def _all_limits(params: Mapping[str, Any]) -> dict[str, Any]:
     """Every limit of a criterion, and of the cause that Gate A judges by, by its place."""
     found: dict[str, Any] = {}
     for name in map(stage_of, GATES):
-        found |= {f"{name}.{item}": v for item, v in _limits(_at(params, f"{name}.limits")).items()}
-        cause = _limits(_at(params, f"{name}.{CAUSE}"))
+        stated = by_criterion(at(params, f"{name}.limits"))
+        found |= {f"{name}.{item}": value for item, value in stated.items()}
+        cause = by_criterion(at(params, f"{name}.{CAUSE}"))
         found |= {f"{name}.{CAUSE}.{item}": value for item, value in cause.items()}
     return found
 
 
-def _limits(limits: Any) -> dict[str, Any]:
+def by_criterion(limits: Any) -> dict[str, Any]:
+    """Limits as written, or what is not applicable, by criterion; they stand below their owners."""
     found: dict[str, Any] = {}
     for entries in limits.values() if isinstance(limits, Mapping) else ():
         for name, entry in entries.items() if isinstance(entries, Mapping) else ():
@@ -306,7 +308,8 @@ def _limits(limits: Any) -> dict[str, Any]:
     return found
 
 
-def _at(params: Mapping[str, Any], place: str) -> Any:
+def at(params: Mapping[str, Any], place: str) -> Any:
+    """What stands in settings at a place with dots; None where nothing does."""
     value: Any = params
     for part in place.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None

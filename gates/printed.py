@@ -14,7 +14,7 @@ from gates.for_ci import as_github, as_junit, beside, cases
 from gates.overriders import require_in_force
 from gates.overrides import OVERRIDES
 from gates.proof import Rung
-from gates.report import read_report
+from gates.report import Gate, read_report
 from gates.writing import INDEX, changed_page
 from genpolicy.errors import GenpolicyError
 
@@ -67,7 +67,7 @@ def problems_beside(root: Path, rungs: Sequence[Rung]) -> list[Problem]:
         rungs: The gates that are asked for, as proved.
     """
     found = [page_problem(root)]
-    proved = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
+    proved = _proved(rungs)
     try:
         reports = {gate: read_report(root, gate)[0] for gate in proved[-1:]}
         require_in_force(root, reports)
@@ -80,6 +80,11 @@ def problems_beside(root: Path, rungs: Sequence[Rung]) -> list[Problem]:
     except GenpolicyError as error:
         found.append(("override", str(error), OVERRIDES, error.exit_code))
     return [problem for problem in found if problem is not None]
+
+
+def _proved(rungs: Sequence[Rung]) -> list[Gate]:
+    """Gates whose report was proved, whatever it says."""
+    return [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
 
 
 def page_problem(root: Path) -> Problem | None:
@@ -101,7 +106,7 @@ def print_cases(
     root: Path, rungs: Sequence[Rung], problems: Sequence[Problem], layout: str
 ) -> None:
     """Every criterion, and what blocks beside the gates, as JUnit XML or for GitHub."""
-    proved = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
+    proved = _proved(rungs)
     found = cases(rungs, {gate: read_report(root, gate)[0] for gate in proved})
     found += [beside(name, text, file) for name, text, file, _ in problems]
     print(as_junit(found) if layout == "junit" else as_github(found))

@@ -7,13 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from gates.stated import Row, compare_rows, training_seed
+from gates.stress.rollouts import REFUSED
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.stress.worth import kept_whole
 from genpolicy.integrity.rows import read_columns
 from genpolicy.verification.refused import KEYS, RefusedCandidates, Rollout
-
-TABLE = "artifacts/stress/refused.parquet"
 
 
 def rederive_refused(
@@ -37,9 +36,9 @@ def rederive_refused(
         IntegrityError: The table is no regular file, or has not the columns of its row.
         BadInputError: It cannot be read.
     """
-    stated = [_hashed(row) for row in read_columns(root / TABLE, RefusedRow).to_pylist()]
+    stated = [_hashed(row) for row in read_columns(root / REFUSED, RefusedRow).to_pylist()]
     derived = list(refused.rows(_kept(rollouts)))
-    compare_rows("D", TABLE, KEYS, stated, derived, seed=training_seed(params))
+    compare_rows("D", REFUSED, KEYS, stated, derived, seed=training_seed(params))
 
 
 def _kept(rollouts: Iterable[Row]) -> set[Rollout]:

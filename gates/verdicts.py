@@ -128,6 +128,18 @@ def decided_text(report: GateReport) -> str:
     return f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
 
 
+def stopping(report: GateReport) -> dict[str, list[Answer]]:
+    """For each candidate that does not pass: what counts and has its verdict, in the order asked.
+
+    Of one that passes, nothing.
+    """
+    answers = counting(report)
+    return {
+        name: [c for c in answers if c.candidate == name and c.verdict == verdict != "PASS"]
+        for name, verdict in report.candidates.items()
+    }
+
+
 def counting(report: GateReport) -> list[Answer]:
     """Criteria by which the verdict is found, each with the verdict that counts.
 

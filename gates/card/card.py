@@ -19,7 +19,7 @@ from gates.card.windows import AbortWindow
 from gates.claim import CHECKPOINT_ONLY
 from gates.doubts import for_a_card
 from gates.floors import HARDEST_CONTACT_N
-from gates.overrides import OVERRIDDEN
+from gates.overrides import is_said
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -192,7 +192,7 @@ def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
     """
     candidate = promoted(reports["D"])
     found = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
-    found.sort(key=lambda caveat: not caveat.startswith(f"{OVERRIDDEN} "))
+    found.sort(key=lambda caveat: not is_said(caveat))
     doubts = [text for gate in sorted(reports) for text in for_a_card(reports[gate], candidate)]
     return tuple(dict.fromkeys([CHECKPOINT_ONLY, *found, *doubts]))
 

@@ -15,13 +15,12 @@ from pathlib import Path
 from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
 from gates.card.signing import read_draft
 from gates.git import git
+from gates.overriders import made_by
 from gates.overrides import OVERRIDES, Override, entries_of, placed
 from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION, asked_by
 from gates.report import GATES, Gate
-from gates.reproducibility.settings import BROUGHT_FOLDER
 from genpolicy.errors import GenpolicyError, IntegrityError
-from genpolicy.evidence.documents.brought import BROUGHT
 from genpolicy.integrity.documents import parse_yaml, read_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of
 
@@ -150,11 +149,9 @@ def require_author_of_brought(
     Raises:
         IntegrityError: The author of its entry is nobody on the list, or no author of the card.
     """
-    folder = root / BROUGHT_FOLDER
-    brought = BROUGHT.read(folder) if (folder / BROUGHT.file).is_file() else {}
-    if candidate not in brought:
+    mail = made_by(root).get(candidate)
+    if mail is None:
         return
-    mail = brought[candidate].author.casefold()
     if who := _no_author(mail, authors, allowed):
         found = f"by {who}, whom its entry names as {mail}"
         expected = f"one of the authors of the card ({', '.join(authors) or 'none is named'})"
@@ -185,7 +182,7 @@ def require_said_by_themselves(root: Path, allowed: AllowList) -> None:
         _refuse(OVERRIDES, "not committed as it lies here", "committed by whom it names", SAY_SO)
     for entry, commits in brought_by(root, entries):
         person = allowed.find(entry.by)
-        own = {mail.casefold() for mail in person.emails} if person else set()
+        own = person.mails if person else frozenset()
         mails = [(git(root, "log", "-1", "--format=%ae", one) or "").casefold() for one in commits]
         if not commits or not own.issuperset(mails):
             others = ", ".join(mail or "nobody" for mail in sorted({*mails} - own))

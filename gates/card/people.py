@@ -46,6 +46,11 @@ class Person(StrictModel):
     emails: tuple[Email, ...] = ()
 
     @property
+    def mails(self) -> frozenset[str]:
+        """The addresses as they are compared: git and entries write them in any case."""
+        return frozenset(mail.casefold() for mail in self.emails)
+
+    @property
     def key(self) -> SSlibKey:
         """The public key, with the identifier that its bytes give it."""
         return SSlibKey.from_crypto(

@@ -15,7 +15,7 @@ from gates.pages.desk_card import Signing
 from gates.pages.desk_costs import share
 from gates.pages.figures import Listing, Picturable, Shown, Table, draw_all, in_order
 from gates.pages.plots_time import TEMPERATURES
-from gates.pages.rows import RowsFile, rows_of
+from gates.pages.rows import Rows, RowsFile
 from gates.report import GATES, NAMES, Gate, GateReport, parse_report, report_bytes, report_path
 from gates.reproducibility.latency_budget import LATENCY, MILLI, budget_of
 from gates.stress.rollouts import ROLLOUTS
@@ -57,14 +57,21 @@ class Exhibit:
 
 
 def exhibits_of(
-    reports: Mapping[Gate, GateReport], evidence: Evidence, signing: Signing
+    reports: Mapping[Gate, GateReport],
+    evidence: Evidence,
+    signing: Signing,
+    rows: Mapping[Gate, Rows],
 ) -> tuple[Exhibit, ...]:
-    """The evidence of every gate, from what its report names."""
-    return tuple(_exhibit(gate, reports.get(gate), evidence, signing) for gate in GATES)
+    """The evidence of every gate, from what its report names, and the rows under it."""
+    return tuple(_exhibit(gate, reports.get(gate), evidence, signing, rows) for gate in GATES)
 
 
 def _exhibit(
-    gate: Gate, report: GateReport | None, evidence: Evidence, signing: Signing
+    gate: Gate,
+    report: GateReport | None,
+    evidence: Evidence,
+    signing: Signing,
+    rows: Mapping[Gate, Rows],
 ) -> Exhibit:
     if report is None:
         there = (evidence.root / report_path(gate)).is_file()
@@ -78,7 +85,7 @@ def _exhibit(
     except (MissingEvidenceError, GenpolicyError) as error:
         return Exhibit(gate, NAMES[gate], missing=shorten(str(error), MOST, placeholder=" …"))
     figure, table = _drawn(evidence.root, gate, report_bytes(report))
-    own = tuple(file for file in rows_of(evidence.root, report).files if file.path in sources)
+    own = tuple(file for file in rows[gate].files if file.path in sources)
     return Exhibit(gate, NAMES[gate], figure, table, own)
 
 

@@ -214,7 +214,7 @@ def index_page(root: Path) -> str:
         rows=rows_by_gate,
         rows_of_criteria=CRITERIA,
         rollouts=rows_by_gate["D"].by_method(ROLLOUTS) if "D" in reports else {},
-        exhibits=exhibits_of(reports, evidence, signing),
+        exhibits=exhibits_of(reports, evidence, signing, rows_by_gate),
         signing=signing,
         end=end_of(reports),
     )

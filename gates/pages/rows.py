@@ -104,9 +104,9 @@ class Rows:
         """Files of one table or document; none where it is not evidence that lies here."""
         return [file for file in self.files if file.path == path]
 
-    def by_method(self, path: str) -> dict[str, list[RowsFile]]:
+    def by_method(self, path: str) -> dict[str, RowsFile]:
         """Files of one table by the method whose rows they hold."""
-        return {file.method: [file] for file in self.of(path)}
+        return {file.method: file for file in self.of(path)}
 
     def under(self, answer: Answer) -> list[RowsFile]:
         """Files under one number: of a candidate its own rows, where the table tells them apart."""

@@ -1,13 +1,12 @@
 """The criteria as a reader needs them: grouped, counted, and what failed without deciding."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
 from gates.pages.numbers import human, limit_said
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
-from gates.verdicts import counting, decided_by, overridden_here
+from gates.verdicts import counting, decided_by, overridden_here, stopping
 
 
 @dataclass(frozen=True)
@@ -142,12 +141,10 @@ def against(criterion: Answer) -> str:
 
 def stops(report: GateReport) -> dict[str, str]:
     """For each candidate that does not pass: the first criterion that it does not meet."""
-    found = {}
-    for name, verdict in report.candidates.items():
-        own: Sequence[Answer] = [c for c in counting(report) if c.candidate == name]
-        unmet = next((c for c in own if c.verdict == verdict != "PASS"), None)
-        found[name] = f"{unmet.id}: {against(unmet)}" if unmet else ""
-    return found
+    return {
+        name: f"{unmet[0].id}: {against(unmet[0])}" if unmet else ""
+        for name, unmet in stopping(report).items()
+    }
 
 
 def passed_by(report: GateReport) -> str:

@@ -12,7 +12,7 @@ shadow evaluation has none, and there nothing is asked.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from genpolicy.verification.arrived import Arrived
+from genpolicy.verification.arrived import TIMED, Arrived
 from genpolicy.verification.journal_source import Message
 from genpolicy.verification.terms import Terms
 
@@ -29,8 +29,6 @@ FAULTS = (
 """How a policy in a process of its own can fail."""
 MISSED = ("deadline", "overrun")
 """How an invocation ends that was not answered in time."""
-TIMED = "start_sha256"
-"""The label of a session that runs on the virtual clock."""
 
 
 @dataclass

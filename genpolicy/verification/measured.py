@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.rotation import rotation_to_6d
+from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.journal_source import Message, floats
 from genpolicy.verification.motion import MotionProof
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
-TIMED = "start_sha256"
-"""The label of a session that runs on the virtual clock."""
 ROUNDING = 1e-6
 """A state has six decimals."""
 POSE_TOLERANCE = 1e-5

@@ -165,7 +165,7 @@ def wire_otherwise(
         scene: The MJCF that describes the robot.
     """
     if np.isnan(first).all():
-        return Varied({}, dict.fromkeys(VARIATIONS, "it answered no question"))
+        return Varied().without(*VARIATIONS, why="it answered no question")
     started = brought.entry.started_here
     threads = _others(brought.entry) if started else None
     with running(brought, contract, scene=scene, threads=threads) as policy:
@@ -173,11 +173,11 @@ def wire_otherwise(
         varied = asked_otherwise(policy, observations, plain=plain)
         told = policy.told
     if not started:
-        varied = Varied(varied.pairs, {THREADS: "it runs already: who started it says how many"})
+        varied = varied.without(THREADS, why="it runs already: who started it says how many")
     elif isinstance(brought.entry, ProgramEntry) or not np.array_equal(plain, first):
         varied = with_threads(varied, plain, plain=first)
     else:  # what differs has been seen; what does not may not have obeyed
-        varied = Varied(varied.pairs, {THREADS: "told, and may not obey; nothing differed"})
+        varied = varied.without(THREADS, why="told, and may not obey; nothing differed")
     if not policy.stochastic:
         return varied.without(ALONE, TOGETHER, why="it draws one chunk a message, always the same")
     at_most = f"its server draws {told.candidates} of the chunks in a message at most"

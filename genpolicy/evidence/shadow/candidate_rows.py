@@ -107,6 +107,11 @@ def numbers_sha256(values: Sequence[float]) -> str:
     return sha256_bytes(numbers.tobytes())
 
 
+def touching_of(verdict: Verdict) -> list[str]:
+    """Names of the two shapes that a refused verdict says touch; empty where it names none."""
+    return verdict.detail.partition(" at row ")[0].split(" and ") if verdict.detail else []
+
+
 def _tightest(verdict: Verdict) -> LayerVerdict:
     """The layer with the smallest margin that is a number; of a chunk that passed."""
     return min(verdict.layers, key=lambda v: v.margin if np.isfinite(v.margin) else np.inf)

@@ -17,6 +17,7 @@ from genpolicy.contract.chunk import Projected
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.gallery import Gallery, RejectedExample
 from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.shadow.candidate_rows import touching_of
 from genpolicy.evidence.shadow.drawn_bodies import drawn_robot, drawn_scene
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, admit, case_of
@@ -98,7 +99,7 @@ def _example(
     if (told.reason, told.row) != (row.first_reason, row.first_row):
         said = f"what the layers say: {told.reason} at action {told.row}"
         raise _another(where, f"rejected for {row.first_reason} at action {row.first_row}", said)
-    touching = verdict.detail.partition(" at row ")[0].split(" and ") if verdict.detail else []
+    touching = touching_of(verdict)
     unit, limits = _quantity(told, projected, case.context, cell)
     return RejectedExample(
         method=row.method,

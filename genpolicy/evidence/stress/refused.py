@@ -12,7 +12,7 @@ from typing import Any
 
 from genpolicy.contract.chunk import actions_sha256, raw_actions
 from genpolicy.evidence.rows.stress import RefusedRow, RolloutRow
-from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
+from genpolicy.evidence.shadow.candidate_rows import numbers_sha256, touching_of
 from genpolicy.evidence.stress.state import InFlight
 from genpolicy.evidence.stress.worth import kept_whole
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
@@ -68,7 +68,7 @@ def _row(rollout: RolloutRow, one: Refused, checker: FeasibilityChecker) -> Refu
     verdict = checker.located(projected, one.result.verdict, context=one.context)
     first = verdict.first
     assert first is not None, "a verdict that passed is no rejection"
-    touching = verdict.detail.partition(" at row ")[0].split(" and ") if verdict.detail else []
+    touching = touching_of(verdict)
     return RefusedRow(
         method=rollout.method,
         seed=rollout.seed,

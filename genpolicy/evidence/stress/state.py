@@ -126,7 +126,7 @@ class InFlight:
     arrival_s: float
     compute_factor: float
     dropped: bool
-    terms_s: Mapping[str, float] = field(default_factory=dict)
+    terms_s: Mapping[str, float]
     chunks: Array | None = None
     candidate: int = 0
     given_up: bool = False

@@ -8,15 +8,22 @@ from gates.evidence import Evidence
 from gates.pages import desk_gates as module
 from gates.pages.desk_card import Signing
 from gates.pages.desk_gates import SHOWN, exhibits_of
+from gates.pages.rows import rows_of
 from gates.report import GATES
 from gates.writing import write_gate
 
 NOTHING = Signing(missing="no card is drafted")
 
 
+def shown(reports, root):
+    """The exhibits as the desk asks for them."""
+    rows = {gate: rows_of(root, report) for gate, report in reports.items()}
+    return exhibits_of(reports, Evidence(root), NOTHING, rows)
+
+
 @pytest.fixture(scope="module")
 def exhibits(whole, judged):
-    found = exhibits_of({gate: judged(gate) for gate in "ABCD"}, Evidence(whole), NOTHING)
+    found = shown({gate: judged(gate) for gate in "ABCD"}, whole)
     return {item.gate: item for item in found}
 
 
@@ -70,24 +77,24 @@ def test_latencies_are_those_of_candidates_in_milliseconds(exhibits, judged):
 
 def test_other_evidence_than_was_judged_is_not_shown(copied, judged):
     evidence.edit_table(copied, "audit/modes.parquet", lambda f: f.assign(successes=1))
-    found = exhibits_of({"A": judged("A")}, Evidence(copied), NOTHING)
+    found = shown({"A": judged("A")}, copied)
     assert found[0].figure is found[0].table is None
     assert "modes.parquet is not the file that the report names" in found[0].missing
     (copied / "reports/gate_b.json").write_text("{")
     (copied / "reports/gate_c.json").unlink(missing_ok=True)
-    found = exhibits_of({"A": judged("A")}, Evidence(copied), NOTHING)
+    found = shown({"A": judged("A")}, copied)
     assert [item.missing for item in found[1:3]] == [module.UNREADABLE, "not judged"]
 
 
 def test_the_same_evidence_is_drawn_once(whole, judged, exhibits, monkeypatch):
     monkeypatch.setattr(module, "draw_all", None)
-    again = exhibits_of({gate: judged(gate) for gate in "ABCD"}, Evidence(whole), NOTHING)
+    again = shown({gate: judged(gate) for gate in "ABCD"}, whole)
     assert {item.gate: item for item in again} == exhibits
 
 
 def test_the_trial_card_shows_who_has_signed_and_who_has_not(whole, judged):
     signing = Signing(signed=("ada (reviewer)",), lacking=("model", "safety"))
-    item = module._exhibit("E", judged("D"), Evidence(whole), signing)
+    item = module._exhibit("E", judged("D"), Evidence(whole), signing, {})
     assert item.table.listed == (
         ("who", "signature"), ("ada (reviewer)", "has signed"),
         ("model", "has not signed"), ("safety", "has not signed"),
