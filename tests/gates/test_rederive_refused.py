@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gates.rederive_refused import TABLE, rederive_refused
+from gates.rederive_refused import REFUSED, rederive_refused
 from genpolicy.errors import IntegrityError, RefusedError
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
@@ -46,9 +46,9 @@ def rollout(start, outcome, duration_s=1.0):
 
 def proved(root, rows, rollouts):
     """Hold these rows against a journal of two refused candidates and one that passed."""
-    (root / TABLE).parent.mkdir(parents=True, exist_ok=True)
+    (root / REFUSED).parent.mkdir(parents=True, exist_ok=True)
     (root / "params.yaml").write_text(yaml.safe_dump(PARAMS))
-    write_rows(root / TABLE, RefusedRow, rows)
+    write_rows(root / REFUSED, RefusedRow, rows)
     refused = RefusedCandidates()
     labels = {"method": "flow", "perturbation": "push", "start": "0"}
     refused.read("session", {"session": "flow/push/0", "labels": labels})
