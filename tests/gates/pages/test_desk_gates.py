@@ -99,7 +99,8 @@ def test_the_trial_card_shows_who_has_signed_and_who_has_not(whole, judged):
         ("who", "signature"), ("ada (reviewer)", "has signed"),
         ("model", "has not signed"), ("safety", "has not signed"),
     )  # fmt: skip
-    assert module._exhibit("E", judged("D"), Evidence(whole), NOTHING).missing == NOTHING.missing
+    nobody = module._exhibit("E", judged("D"), Evidence(whole), NOTHING, {})
+    assert nobody.missing == NOTHING.missing
 
 
 def test_the_desk_links_to_rows_that_lie_there(copied):

@@ -40,7 +40,7 @@ def test_rows_are_those_of_the_table_of_one_method_with_their_numbers(rows, whol
     """Held against the table as pandas reads it, and a share counted from the file alone."""
     frame = pd.read_parquet(whole / ROLLOUTS)
     own = frame[frame["method"] == "flow"].reset_index(drop=True)
-    (file,) = rows["D"].by_method(ROLLOUTS)["flow"]
+    file = rows["D"].by_method(ROLLOUTS)["flow"]
     found = read(file.data)
     assert (file.kept, file.of, file.name) == (len(own), len(own), "stress.rollouts.flow.csv")
     assert [row["row"] for row in found] == [str(n) for n in range(1, len(own) + 1)]
@@ -77,7 +77,7 @@ def test_a_row_names_its_rollout_where_the_journal_is_evidence(whole, judged, mo
     report = judged("D")
     names = {f"artifacts/stress/journals/flow__{name}.mcap": "0" * 64 for name in ("nominal",)}
     with_journal = report.model_copy(update={"materials": {**report.materials, **names}})
-    (file,) = rows_of(whole, with_journal).by_method(ROLLOUTS)["flow"]
+    file = rows_of(whole, with_journal).by_method(ROLLOUTS)["flow"]
     for row in read(file.data):
         name = f"flow/{row['perturbation']}/{row['start']}"
         assert row["rollout"] == (name if row["perturbation"] == "nominal" else "")
@@ -138,7 +138,7 @@ def test_a_text_that_a_spreadsheet_would_run_stays_text(whole, copied):
         copied, "stress/rollouts.parquet", lambda f: f.assign(rejected_by=bad, force_peak_n=-1.0)
     )
     report = judge(copied, "D")
-    (file,) = rows_of(copied, report).by_method(ROLLOUTS)["flow"]
+    file = rows_of(copied, report).by_method(ROLLOUTS)["flow"]
     found = read(file.data)
     assert {row["rejected_by"] for row in found} == {f"'{bad}"}
     assert {row["force_peak_n"] for row in found} == {"-1"}, "a number is no text"

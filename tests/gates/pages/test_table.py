@@ -93,8 +93,8 @@ def test_groups_hold_every_criterion_once_in_order(ladder, gate):
 
 def test_what_is_not_decided_is_told_from_what_was_not_measured():
     def of(verdict, interval=None):
-        return SimpleNamespace(verdict=verdict, interval=interval, candidate=None)
+        return SimpleNamespace(id="held", verdict=verdict, interval=interval, candidate=None)
 
     criteria = [of("PASS"), of("INCONCLUSIVE", (0.1, 0.2)), of("INCONCLUSIVE"), of("INCONCLUSIVE")]
-    report = SimpleNamespace(criteria=criteria, verdict="INCONCLUSIVE")
+    report = SimpleNamespace(gate="D", criteria=criteria, verdict="INCONCLUSIVE", overrides=())
     assert tally(report) == "1 of 4 hold; 1 not decided; 2 not measured"
