@@ -26,6 +26,7 @@ from genpolicy.verification.report import Reached
 NOTHING = "nothing that simulation can show"
 NOT_PROPOSED = "not proposed"
 ELSEWHERE = "not built here"
+MISSING = "missing on the signed card"
 AS_SIMULATED = "as simulated; for another one plan it and run again"
 ABORTS = {
     "latency_s": "more than 5 % of answers later than",
@@ -153,7 +154,7 @@ def _items(
             "Ends it: contact force above",
             _force(draft.candidate, report, evidence),
             NOT_PROPOSED,
-            f"{signed.force_limit_n:.3g} N: {signed.force_limit_reason}" if signed else "",
+            _signed_force(signed),
             "safety",
         ),
         *_aborts(draft, signed, report),
@@ -186,6 +187,15 @@ def _box(low: Point | None, high: Point | None) -> str:
     return ", ".join(f"{a} {MM_PER_M * x:.0f} to {MM_PER_M * y:.0f}" for a, x, y in sides)
 
 
+def _signed_force(signed: TrialCard | None) -> str:
+    """What people set; a card that lacks it is refused, and must be seen to lack it."""
+    if signed is None:
+        return ""
+    if signed.force_limit_n is None:
+        return MISSING
+    return f"{signed.force_limit_n:.3g} N: {signed.force_limit_reason}"
+
+
 def _force(candidate: str, report: GateReport, evidence: Evidence) -> str:
     try:
         require_bound(evidence, report, ROLLOUTS)
@@ -208,11 +218,18 @@ def _aborts(draft: TrialCard, signed: TrialCard | None, report: GateReport) -> l
                 f"Ends it: {ABORTS[name]}",
                 f"{at_its_end(answer)} in the worst condition; {draft.abort_windows[name].tried}",
                 f"{human(answer, most)}, {draft.abort_windows[name].over}",
-                human(answer, signed.abort_thresholds[name]) if signed else "",
+                _signed_threshold(signed, name, answer),
                 answer.owner or "nobody",
             )
         )
     return items
+
+
+def _signed_threshold(signed: TrialCard | None, name: str, answer: Answer) -> str:
+    if signed is None:
+        return ""
+    value = signed.abort_thresholds.get(name)
+    return MISSING if value is None else human(answer, value)
 
 
 def _rollback(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Item:

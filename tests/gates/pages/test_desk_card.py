@@ -11,7 +11,7 @@ from team import PEOPLE, Team
 
 from gates.card.signing import read_draft
 from gates.evidence import Evidence
-from gates.pages.desk_card import ABORTS, NOT_PROPOSED, card_of, papers_of, signing_of
+from gates.pages.desk_card import ABORTS, MISSING, NOT_PROPOSED, card_of, papers_of, signing_of
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +110,24 @@ def test_what_people_set_and_who_they_are(copied, judged):
     assert signing.signed == ("rita (reviewer)", "mo (model)")
     assert signing.lacking == ("perception", "controller", "safety")
     assert card.spotter == items["Who stands at it"].yours == "sam"
+
+
+def test_what_a_signed_card_lacks_is_said_to_be_missing(copied, judged):
+    """Forged past every check of signing: gate E refuses it, and its page is there to say so."""
+    team = Team(copied)
+    team.sign(team.complete(), ["rita"])
+
+    def without_limits(payload):
+        payload["predicate"].update(force_limit_n=None, abort_thresholds={})
+        return payload
+
+    team.forge(without_limits)
+    reports = {**{gate: judged(gate) for gate in "ABCD"}, "E": team.judge()}
+    signing, card = of(copied, reports)
+    assert reports["E"].verdict == "FAIL" and card.force_limit_n is None
+    aborts = {f"Ends it: {words}" for words in ABORTS.values()}
+    lacking = {field for field, item in by_field(signing).items() if item.yours == MISSING}
+    assert lacking == {"Ends it: contact force above", *aborts}
 
 
 def test_a_refused_card_is_said_to_be_refused(copied, judged):
