@@ -25,6 +25,8 @@ class Measured:
             number that counts none.
         undecided: What decides where the limit lies inside the interval, without a semicolon;
             empty where more of the same evidence does.
+        point: What was seen, where `value` is an end of an interval over independent units, as
+            `counted` says them; says how many more would decide, and is never judged.
     """
 
     value: float | None
@@ -33,6 +35,7 @@ class Measured:
     pending: bool = False
     counted: str = ""
     undecided: str = ""
+    point: float | None = None
 
 
 @dataclass(frozen=True)

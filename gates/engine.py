@@ -14,6 +14,7 @@ from typing import Any
 
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.more import astride
 from gates.overrides import NOBODY, Exceptions, aside, exceptions_of, rule, said
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
 from gates.preregistration import moved_caveats
@@ -53,8 +54,6 @@ REGIME = (
     "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
     "elsewhere samples within 1e-5 and the same verdict"
 )
-ASTRIDE = "the limit lies inside the interval: more of the same evidence decides"
-"""Said of what is neither shown to hold nor shown to be broken."""
 
 
 @dataclass(frozen=True)
@@ -234,7 +233,7 @@ def _answer(
     verdict = judge_criterion(value, threshold, item.comparison, interval)
     caveat = measured.caveat
     if verdict == "INCONCLUSIVE" and value is not None and threshold is not None:
-        said = measured.undecided or ASTRIDE
+        said = measured.undecided or astride(measured, threshold, item.comparison)
         caveat = f"{caveat}; {said}" if caveat else said
     if measured.pending and verdict != "PASS" and limit is not None:
         verdict = "PENDING_REVIEW"

@@ -96,7 +96,8 @@ def mode_admissible_gap(
     text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
     text += f" episodes answered in several modes; upper bound of {more} minus {less}{said}"
     counted = f"{min(seen.values())} episodes of the rarer mode"
-    return Measured(interval[1], interval, text, counted=counted)
+    gap = float(np.mean(shares[more][0]) - np.mean(shares[less][0]))
+    return Measured(interval[1], interval, text, counted=counted, point=gap)
 
 
 def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], str]:
@@ -133,7 +134,8 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
         f"observations; lower bound over {episodes.nunique()} episodes, whose observations are "
         f"not independent{_unknown(rows)}"
     )
-    return Measured(lower, (lower, upper), text, counted=f"{episodes.nunique()} episodes")
+    counted = f"{episodes.nunique()} episodes"
+    return Measured(lower, (lower, upper), text, counted=counted, point=share)
 
 
 @criterion(
@@ -181,7 +183,7 @@ def _of_admissible(
         f"{rows['observation'].nunique()} held-out observations in {episodes.nunique()} episodes"
     )
     counted = f"{episodes.nunique()} episodes"
-    return Measured(interval[1], interval, text, counted=counted)
+    return Measured(interval[1], interval, text, counted=counted, point=point)
 
 
 @criterion(

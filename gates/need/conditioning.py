@@ -93,4 +93,5 @@ def phase_collapse_share(evidence: Evidence, settings: NeedSettings) -> Measured
         f"episodes with modes: {without} without the phase, {seen} with it; upper bound. With "
         "one phase only both are the same, because there is nothing to look at"
     )
-    return Measured(interval[1], interval, text, counted=f"{lost} of {without} episodes")
+    counted = f"{lost} of {without} episodes"
+    return Measured(interval[1], interval, text, counted=counted, point=lost / without)

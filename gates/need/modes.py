@@ -121,7 +121,8 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"share {share:.4g} of {len(rows)} situations; lower bound over {episodes} episodes, whose "
         f"situations are not independent; {_median(evidence, settings)}"
     )
-    return Measured(lower, (lower, upper), text, counted=f"{episodes} episodes")
+    counted = f"{episodes} episodes"
+    return Measured(lower, (lower, upper), text, counted=counted, point=share)
 
 
 def _median(evidence: Evidence, settings: NeedSettings) -> str:

@@ -52,7 +52,7 @@ def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured
         f"{method} reaches a mode with an admissible chunk in {share:.4g} of {count} situations; "
         "upper bound over episodes"
     )
-    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
+    return _bounded(share, (lower, upper), text, episodes)
 
 
 @criterion(
@@ -96,7 +96,7 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{shown[3]} {shown[2]:.3g} (shown, not judged: with one valid mode it stays valid, and "
         "what it loses shows in motion, at Gate D)"
     )
-    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
+    return _bounded(share, (lower, upper), text, episodes)
 
 
 def redrawn_validity(rows: pd.DataFrame, *, redraws: int) -> Array:
@@ -226,7 +226,12 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"largest of {len(names)} variants ({', '.join(names)}), {name} with {share:.4g}; upper "
         "bound over episodes, level divided among the variants; short training"
     )
-    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
+    return _bounded(share, (lower, upper), text, episodes)
+
+
+def _bounded(share: float, ends: tuple[float, float], text: str, episodes: int) -> Measured:
+    """An upper bound of a share over episodes."""
+    return Measured(ends[1], ends, text, counted=f"{episodes} episodes", point=share)
 
 
 def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:

@@ -80,7 +80,8 @@ def late_change_upper(
         f"last quarter; not judged: validation loss falls {_text(fall)}"
     )
     ends = (max(low, -high, 0.0), upper)
-    return Measured(upper, ends, text, counted=f"{episodes} episodes")
+    counted = f"{episodes} episodes"
+    return Measured(upper, ends, text, counted=counted, point=abs(point))
 
 
 def _valid(rows: pd.DataFrame) -> pd.DataFrame:
@@ -109,7 +110,8 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
     upper, _, worst = max(found)
     each = "; ".join(f"{method} {_text(fall)}" for _, method, fall in found)
     text = each + (f"; no training of its own: {', '.join(foreign)}" if foreign else "")
-    return Measured(upper, worst.interval, text, counted=f"{worst.episodes} episodes")
+    counted = f"{worst.episodes} episodes"
+    return Measured(upper, worst.interval, text, counted=counted, point=worst.share)
 
 
 def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: float) -> Fall:

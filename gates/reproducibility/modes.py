@@ -29,16 +29,18 @@ def mode_coverage_lower(
             hits, list(rows["episode_uuid"]), confidence=settings.confidence, favourable=True
         )
         reached = float((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).mean())
-        found.append((lower, upper, int(hits.sum()), rows, reached))
-    lower, upper, covered, rows, reached = min(found, key=lambda seed: seed[0])
+        found.append((lower, upper, hits, rows, reached))
+    lower, upper, hits, rows, reached = min(found, key=lambda seed: seed[0])
     episodes = rows["episode_uuid"].nunique()
     text = (
-        f"in {covered} of {len(rows)} two-mode situations every mode gets at least "
+        f"in {hits.sum()} of {len(rows)} two-mode situations every mode gets at least "
         f"{settings.mode_minimum_share:g} of the samples, admissible; "
         f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}; "
         f"lower bound over {episodes} episodes"
     )
-    return Measured(lower, (lower, upper), text, counted=f"{episodes} episodes")
+    share = float(hits.mean())
+    counted = f"{episodes} episodes"
+    return Measured(lower, (lower, upper), text, counted=counted, point=share)
 
 
 @criterion(
@@ -67,7 +69,8 @@ def outside_modes_upper(
         f"share {share:.4g} over {situations} two-mode situations, {far_away:g} samples far from "
         "every mode; upper bound over episodes"
     )
-    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
+    counted = f"{episodes} episodes"
+    return Measured(upper, (lower, upper), text, counted=counted, point=share)
 
 
 def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> pd.DataFrame:

@@ -186,7 +186,8 @@ def in_every_condition(
     others = ", ".join(f"{name} {end:.4g}" for end, _, _, name, _ in found if name != condition)
     text = f"worst in {condition}: {point:.4g}, bounded by {upper:.4g}"
     text += f"; {others}" if others else ""
-    return Measured(upper, (lower, upper), text, counted=f"{starts} starts")
+    counted = f"{starts} starts"
+    return Measured(upper, (lower, upper), text, counted=counted, point=point)
 
 
 def success_lower(
@@ -210,4 +211,5 @@ def success_lower(
         found.append((lower, upper, share, condition, part["start"].nunique()))
     lower, upper, share, condition, starts = min(found)
     text = f"{condition}: share {share:.4g}, lower bound over {starts} starts"
-    return Measured(lower, (lower, upper), text, counted=f"{starts} starts")
+    counted = f"{starts} starts"
+    return Measured(lower, (lower, upper), text, counted=counted, point=share)

@@ -9,8 +9,9 @@ import pytest
 from asking import SPEC
 
 from gates.criterion import Measured
-from gates.engine import ASTRIDE, environment, judge, promoted_below, upstream_hashes
+from gates.engine import environment, judge, promoted_below, upstream_hashes
 from gates.evidence import Evidence
+from gates.more import ASTRIDE, INSIDE
 from gates.pipeline import TASK_IDENTITY, Basis
 from gates.report import report_bytes, report_path
 from gates.settings import GateSettings, Limit, Limits, Waiver
@@ -128,6 +129,13 @@ def test_astride_is_said_only_of_a_number_with_a_limit_that_is_not_decided(tmp_p
     assert _asked(tmp_path, Measured(0.5, (0.5, 2.0))).caveat == ASTRIDE
     for measured in (Measured(0.5), Measured(2.0), Measured(None)):
         assert _asked(tmp_path, measured).caveat == ""
+
+
+def test_where_the_share_that_was_seen_is_known_it_is_said_how_many_more_decide(tmp_path):
+    """Limit 1, at least: 1.5 was seen, its lower end .5 is as far below as the share above."""
+    found = _asked(tmp_path, Measured(0.5, (0.5, 2.0), counted="9 episodes", point=1.5))
+    more = "about 4 times as many (9 episodes now) show that it holds, if they say the same"
+    assert found.caveat == f"{INSIDE}: {more}"
     assert _asked(tmp_path, Measured(1.0), of={}).caveat == ""
 
 

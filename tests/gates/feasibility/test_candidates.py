@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from asked import asked, found_in
 
-from gates.engine import ASTRIDE
 from gates.evidence import MissingEvidenceError
 from gates.feasibility.candidates import (
     admissible,
@@ -15,6 +14,7 @@ from gates.feasibility.candidates import (
     projection_p95_m,
 )
 from gates.feasibility.settings import LAYERS, REASONS
+from gates.more import INSIDE
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -114,13 +114,13 @@ def test_the_worse_end_of_the_gap_decides(ladder):
     report, found = _gap(ladder)
     assert report.verdict == found.verdict == "INCONCLUSIVE"
     assert found.interval[0] < 16 / 60 < 0.3 < found.measured
-    assert ASTRIDE in found.caveat and ASTRIDE in report.diagnosis
+    assert INSIDE in found.caveat and INSIDE in report.diagnosis
     assert "upper bound of left minus right" in found.caveat
     assert "left 1 of 60, right 0.7333 of 60 episodes" in found.caveat
     evidence.edit_table(ladder, CANDIDATES, _reject("right", 32))
     report, found = _gap(ladder)
     assert report.verdict == found.verdict == "FAIL" and found.interval[0] > 0.3
-    assert ASTRIDE not in found.caveat
+    assert INSIDE not in found.caveat
 
 
 def test_the_gap_counts_whichever_mode_is_removed(ladder):

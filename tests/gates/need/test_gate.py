@@ -9,7 +9,7 @@ from editing import cells
 
 from gates.cause import default_limits
 from gates.criterion import Criterion
-from gates.engine import ASTRIDE
+from gates.more import INSIDE
 from gates.need.settings import NeedSettings
 from gates.proof import SPECS, judge
 from gates.settings import read_params
@@ -189,7 +189,8 @@ def test_where_it_is_open_whether_a_simpler_policy_does_nobody_is_told_to_take_i
     assert verdicts(report)["remedy_valid_share"] == report.verdict == "INCONCLUSIVE"
     assert "record more episodes, to know whether the simpler policy" in report.diagnosis
     assert "run the simpler policy" not in report.diagnosis
-    assert f"({ASTRIDE}). Should it be broken: Baselines:" in report.diagnosis
+    said = "so near that 10 times as many (30 episodes now) may not decide"
+    assert f"({INSIDE}: {said}). Should it be broken: Baselines:" in report.diagnosis
 
 
 def _independent(entries):
