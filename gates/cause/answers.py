@@ -115,6 +115,8 @@ class Cause:
         agreeing: How many of how many resampled audits name the same; where it is not said, how
             many contradict it.
         found: What was found of modes and hidden variables, a sentence each, whatever the verdict.
+        beside: Where modes were looked for, and those that the cause does not speak of, a sentence
+            each.
     """
 
     name: CauseName
@@ -126,6 +128,7 @@ class Cause:
     confidence: float | None
     agreeing: tuple[int, int] = (0, 0)
     found: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:

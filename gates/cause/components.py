@@ -69,6 +69,18 @@ def looked_in(numbers: Numbers) -> str:
     return f"{words} ({'; '.join(rest)})" if rest else words
 
 
+def beside(numbers: Numbers, red: Topic) -> tuple[str, ...]:
+    """What bounds a cause that speaks of modes: where they were looked for, and what else is there.
+
+    Returns:
+        A sentence each; none of a cause that speaks of no modes.
+    """
+    if red not in SPEAK_OF_MODES or not numbers.components:
+        return ()
+    looked = f"Modes were looked for in {looked_in(numbers)}, of each component by itself."
+    return tuple(filter(None, [looked, others(numbers, red).strip()]))
+
+
 def others(numbers: Numbers, red: Topic) -> str:
     """What was found beside the component that was followed, a sentence; empty where nothing."""
     found = [item for item in numbers.components if item.two_mode and not item.followed]

@@ -19,7 +19,7 @@ from gates.cause.answers import (
     Topic,
     in_words,
 )
-from gates.cause.components import others
+from gates.cause.components import beside, others
 from gates.cause.confidence import confidence_of
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
@@ -96,6 +96,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         confidence=confidence_of(verdict.name, red, (sum(same), len(same)), numbers),
         agreeing=(sum(same), len(same)),
         found=found_words(numbers, limits),
+        beside=beside(numbers, red),
     )
 
 

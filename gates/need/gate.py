@@ -56,6 +56,14 @@ def _cause(judged: Judged) -> str:
     return f"{text} One mode alone may still be enough: {ONE_MODE}"
 
 
+def _beside(judged: Judged) -> tuple[str, ...]:
+    """What the cause does not vouch for, also where all holds."""
+    try:
+        return found_cause(judged.evidence, judged.settings).beside
+    except MissingEvidenceError:
+        return ()
+
+
 GATE = GateSpec(
     gate="A",
     settings=NeedSettings,
@@ -88,6 +96,7 @@ GATE = GateSpec(
         "held-out episodes, not training, and small effects may be luck.",
     ),
     note=_cause,
+    said=_beside,
 )
 
 

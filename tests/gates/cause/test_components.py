@@ -40,6 +40,19 @@ def test_modes_beside_those_followed_are_named_and_not_vouched_for():
     found = with_component(VALID, "rotation", two_mode=60, two_mode_episodes=30)
     text = named(found).next_action
     assert "This is about the modes of position" in text and "rotation (30 episodes)" in text
+    assert named(found).beside[1:] == (text[text.index("This is about") :],)
+
+
+def test_where_was_looked_is_said_beside_every_cause_that_speaks_of_modes():
+    looked = "Modes were looked for in position, rotation and timing (gripper hardly varies)"
+    for numbers in (VALID, ONE_ACTION):
+        [said] = named(numbers).beside
+        assert said == f"{looked}, of each component by itself."
+    assert named(replace(VALID, components=())).beside == ()
+    defect = (
+        replace(VALID, label_disagreement=0.5) if hasattr(VALID, "label_disagreement") else None
+    )
+    assert defect is None or named(defect).beside == ()
 
 
 def test_every_component_stands_among_the_answers():

@@ -222,3 +222,23 @@ def test_a_pass_says_first_that_one_mode_may_be_enough(ladder):
     report = judge(ladder, "A")
     assert report.verdict == "PASS" and "one_mode_bc" in report.diagnosis
     assert "one_mode_bc" in report.caveats[0]
+
+
+def test_a_pass_names_the_modes_that_it_does_not_speak_of(ladder):
+    """The tool turns in two ways as well: nobody looked whether that succeeds."""
+    assert any("looked for in" in caveat for caveat in judge(ladder, "A").caveats)
+    turned = {"two_mode": 60, "two_mode_episodes": 30, "state": "varies"}
+    evidence.edit_table(
+        ladder,
+        "audit/components.parquet",
+        lambda f: f.assign(
+            **{
+                key: np.where(f["component"] == "rotation", new, f[key])
+                for key, new in turned.items()
+            }
+        ),
+    )
+    report = judge(ladder, "A")
+    assert report.verdict == "PASS"
+    [said] = [caveat for caveat in report.caveats if "others were found" in caveat]
+    assert "the modes of position" in said and "rotation (30 episodes)" in said
