@@ -77,6 +77,7 @@ def test_a_term_that_waited_longer_than_it_took_is_no_evidence(waited):
 
 def test_the_share_is_that_of_the_process_that_waited_most():
     assert waited_share(np.array([1.0, 2.0]), np.array([0.9, 1.0])) == pytest.approx(0.5)
+    assert waited_share(np.array([1.0, 2.0]), np.array([1.0, 2.0])) == 0.0, "nobody waited"
     for ran in ([0.0, 1.0], [1.1, 1.0]):
         with pytest.raises(MissingEvidenceError, match="ran longer"):
             waited_share(np.array([1.0, 2.0]), np.array(ran))
