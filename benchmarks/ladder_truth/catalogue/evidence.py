@@ -131,8 +131,8 @@ WRONGS = (
           "small",
           patched("genpolicy/evidence/stress/matched.py", ("\n\ndef step(", OF_ANOTHER),
                   ("drawn = policy.sample(", "drawn = _instead_of(policy).sample(")),
-          Expected("D", refusal=r"flow__\w+\.mcap: flow/.* beside it|flow: \w+, start \d+ is another "
-                   "chunk than was drawn"),
+          Expected("D", refusal=r"flow__\w+\.mcap: flow/.* beside it|flow: \w+, start \d+ is "
+                   "another chunk than was drawn"),
           note="Added with the check that draws chunks again. The stage `monitors` asks the same "
           "before; its words were added after the first run with it, which had counted elsewhere."),
     Wrong("shadow_of_another_checkpoint", "evidence",

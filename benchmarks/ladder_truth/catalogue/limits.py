@@ -57,8 +57,8 @@ WRONGS = (
     Wrong("a_limit_is_nan", "limits", "The limit on stale actions is not a number.",
           "small", _entry("gate_c", "stub_stale", lambda e, n: e[n].__setitem__(0, float("nan"))),
           Expected("B", ("stub_stale",), refusal=r"stub_stale|nan|NaN|finite"),
-          note="Named for Gate C at first; the stage `candidates`, which every run begins Gate B with, "
-          "reads the whole file since, and refuses it. Moved after that run."),
+          note="Named for Gate C at first; the stage `candidates`, with which Gate B begins, reads "
+          "the whole file since, and refuses it. Moved after that run."),
     Wrong("a_limit_without_a_reason", "limits", "Somebody moved a limit and took its reason away.",
           "small", _entry("gate_b", "nfe_mismatch", lambda e, n: e.__setitem__(n, 3)),
           Expected("B", ("nfe_mismatch",), refusal=r"nfe_mismatch|reason")),
