@@ -3,15 +3,42 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from genpolicy.errors import ContractError
 from genpolicy.integrity.hashing import sha256_file
-from stages import train_baselines, train_factors, train_generators
+from stages import (
+    audit,
+    latency,
+    measure_baselines,
+    measure_factors,
+    monitors,
+    reload,
+    shadow,
+    stress,
+    train_baselines,
+    train_factors,
+    train_generators,
+    wall_clock,
+)
 from stages._contracts import require_contract_of_task, require_one_contract
 
-TRAIN = (train_baselines, train_factors, train_generators)
+STAGES = (
+    audit, latency, measure_baselines, measure_factors, monitors, reload, shadow, stress,
+    train_baselines, train_factors, train_generators, wall_clock,
+)  # fmt: skip
+TRAINED = {
+    latency: ("train_baselines", "train_generators"), measure_baselines: ("train_baselines",),
+    measure_factors: ("train_factors",), monitors: ("train_generators",),
+    reload: ("train_generators",), shadow: ("train_generators",),
+    stress: ("train_baselines", "train_generators"), train_generators: ("train_baselines",),
+    wall_clock: ("train_generators",),
+}  # fmt: skip
+"""Whose checkpoints each of them reads."""
+READING = [stage for stage in STAGES if stage is not stress]
+"""Who reads the dataset: the comparison rolls out, and asks for the checkpoints only."""
 TASK = {"observation_sha256": "o", "action_sha256": "a", "name": "t", "phases": {"all": ["p"]}}
 MANIFEST = {
     "observation_contract": {"sha256": "o"}, "action_contract": {"sha256": "a"}, "phases": ["p"],
@@ -73,15 +100,43 @@ def test_a_checkpoint_of_another_dataset_is_refused_where_the_dataset_is_read(ar
         require_one_contract("train_x")
 
 
-@pytest.mark.parametrize("stage", TRAIN)
-def test_nothing_is_trained_on_a_dataset_of_another_contract(artifacts, monkeypatch, stage):
-    def trains(*_args, **_others):
-        pytest.fail("it trained")
+class Untouched:
+    """Settings of which nobody may read anything before the contracts were compared."""
 
-    for name, instead in (
-        ("admit", lambda *_: None), ("train_matched", trains), ("train_variants", trains),
-    ):  # fmt: skip
-        monkeypatch.setattr(stage, name, instead, raising=False)
+    def __getattr__(self, name):
+        pytest.fail(f"{name} was read before the contracts were compared")
+
+
+@pytest.fixture
+def admitted(monkeypatch):
+    """Every gate passed, so that nothing but the contracts can stop a stage."""
+    for stage in STAGES:
+        passed = SimpleNamespace(candidates=("flow",))
+        monkeypatch.setattr(stage, "admit", lambda *_, passed=passed: passed, raising=False)
+
+
+def test_every_stage_that_asks_is_among_these():
+    folder = Path(audit.__file__).parent
+    asking = {p.stem for p in folder.glob("*.py") if "import require_one_contract" in p.read_text()}
+    assert asking == {stage.__name__.removeprefix("stages.") for stage in STAGES}
+
+
+@pytest.mark.usefixtures("admitted")
+@pytest.mark.parametrize("stage", READING, ids=lambda stage: stage.__name__)
+def test_no_stage_begins_on_a_dataset_of_another_contract(artifacts, stage):
     artifacts("ingest/manifest.json", {**MANIFEST, "phases": ["q"]})
     with pytest.raises(ContractError, match=r"manifest\.json: phase"):
-        stage.work(None)
+        stage.work(Untouched())
+
+
+@pytest.mark.usefixtures("admitted")
+@pytest.mark.parametrize(
+    ("stage", "training"),
+    [(stage, training) for stage, read in TRAINED.items() for training in read],
+    ids=lambda item: item if isinstance(item, str) else item.__name__,
+)
+def test_no_stage_begins_with_a_checkpoint_of_another_contract(artifacts, stage, training):
+    digest = sha256_file(Path("artifacts/ingest/manifest.json"))
+    artifacts(f"{training}/m/seed_0/config.json", _config(digest, action="x"))
+    with pytest.raises(ContractError, match=rf"{training}/.*config\.json: action"):
+        stage.work(Untouched())

@@ -14,6 +14,9 @@ GRADED = "@"
 """Between a condition and a size of it that is run for a curve, in the name of that."""
 ENVELOPE = "envelope"
 """Name of the condition that runs inside the trial card's envelope, and its kind."""
+OF_THEIR_NAME = ("nominal", "recovery_drill")
+"""Gate D asks other things of the conditions of these names, so each is of that kind. Of the kind
+there may be more; they are asked as all others are."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Seconds = Annotated[float, Field(ge=0.0)]
 
@@ -113,6 +116,14 @@ class StressSettings(Settings):
         for name, condition in self.perturbations.items():
             if isinstance(condition, ReducedEnvelope) != (name == ENVELOPE):
                 raise ValueError(f"`{ENVELOPE}` is the name of the one condition of that kind")
+        return self
+
+    @model_validator(mode="after")
+    def _what_their_name_says(self) -> Self:
+        for name in OF_THEIR_NAME:
+            condition = self.perturbations.get(name)
+            if condition is not None and condition.kind != name:
+                raise ValueError(f"`{name}` is the name of a condition of that kind alone")
         return self
 
     @model_validator(mode="after")

@@ -20,6 +20,22 @@ def test_a_perturbation_that_names_no_kind_is_of_its_name():
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("name", ["nominal", "recovery_drill", "envelope"])
+def test_no_condition_has_the_name_of_one_that_gate_d_asks_less_or_more_of(name):
+    """The drill is not asked for its fallback: under its name a delay was not asked for it."""
+    late = {"kind": "camera_delay", "probability": 1.0, "magnitude_s": 0.08}
+    named = {**PLAIN["perturbations"], "later": late}
+    assert StressSettings(**{**PLAIN, "perturbations": named})
+    with pytest.raises(ValidationError, match=f"`{name}` is the name of"):
+        StressSettings(**{**PLAIN, "perturbations": {**PLAIN["perturbations"], name: late}})
+
+
+@pytest.mark.parametrize("kind", ["nominal", "recovery_drill"])
+def test_a_condition_of_such_a_kind_may_have_another_name_and_is_asked_as_all_are(kind):
+    named = {**PLAIN["perturbations"], "again": {"kind": kind}}
+    assert StressSettings(**{**PLAIN, "perturbations": named}).perturbations["again"].kind == kind
+
+
 def test_candidates_share_alpha_in_equal_parts():
     settings = StressSettings(**PLAIN)
     assert settings.alpha_of_each(1) == 0.05
