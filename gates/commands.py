@@ -152,7 +152,7 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     """Hash all evidence, derive all verdicts again.
 
     The independent checker reads every journal again, and each rollout must be
-    what its journal says; the front page must be the one that the reports give.
+    what its journal says; all pages must be those that the reports give.
     Exit 3 if a report is untrue, 2 if one cannot be read.
     """
     from gates.printed import NOT_BUILT, not_built, pages_code, print_rungs, worst
@@ -224,7 +224,7 @@ def sign_card(
 
     Before, gates A to D are proved again, the plan must have been committed
     before the evidence, nobody but the authors may have committed to the
-    candidate, and the evidence must be what its journals say (minutes).
+    candidate, evidence must be what its journals say (minutes), pages what reports say.
     """
     from gates.card import signing
     from gates.overriders import require_in_force

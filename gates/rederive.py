@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gates.pages.printing import differing
 from gates.proof import Rung
 from gates.rederive_brought import rederive_brought
 from gates.rederive_clocks import rederive_clocks
@@ -24,7 +25,7 @@ from gates.rederive_refused import rederive_refused
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.rederive_splices import rederive_splices
-from gates.report import Gate
+from gates.report import Gate, read_report, report_path, stage_of
 from gates.settings import PARAMS_FILE, read_params, section_of
 from gates.stated import (
     Row,
@@ -38,7 +39,7 @@ from gates.stated import (
 )
 from gates.stress.rollouts import FAULTS
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import ConfigError, GenpolicyError
+from genpolicy.errors import ConfigError, GenpolicyError, RefusedError
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import ENVELOPE, POWER
 from genpolicy.evidence.shadow.tables import checked
@@ -95,14 +96,24 @@ def _rederived(root: Path, rung: Rung) -> Rung:
 def rederive(root: Path, gate: Gate) -> None:
     """Hold the evidence of a gate against what lies under it: its journals, the rows of a dataset.
 
+    What is printed of it is printed again behind that: `dvc commit` records an edited page as
+    readily as the one that the gate printed.
+
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
             planned, a chunk not what its checkpoint draws again, or a power, a mutant, a
-            statistic, a split or the cost of a distillation is not what is computed again.
+            statistic, a split or the cost of a distillation is not what is computed again. Or a
+            page or a file of rows says other than the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
+    _evidence(root, gate)
+    _printed(root, gate)
+
+
+def _evidence(root: Path, gate: Gate) -> None:
+    """Everything that lies under a report of the gate."""
     if gate == "A":
         rederive_dataset(root)
     params = read_params(root)
@@ -133,6 +144,21 @@ def rederive(root: Path, gate: Gate) -> None:
         rederive_distilled(root, training_seed(params))
         _envelope(root, params)
         _power(root, params)
+
+
+def _printed(root: Path, gate: Gate) -> None:
+    """Pages and rows that lie there, recorded or not, byte by byte; one never printed is no lie."""
+    if not (root / report_path(gate)).is_file():
+        return
+    if page := differing(root, read_report(root, gate)[0], whole=False):
+        raise RefusedError(
+            gate=gate,
+            criterion=page,
+            measured="another page",
+            limit="the one that the report gives",
+            report=report_path(gate),
+            action=f"Run `dvc repro -f {stage_of(gate)}`; never edit a page.",
+        )
 
 
 def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotion]:

@@ -59,7 +59,8 @@ def changed_page(root: Path) -> str:
 
     Empty if none is. The first page has no record, since every gate prints it again, and neither
     have those of a gate whose entry was taken out of `dvc.lock`: these are printed once more and
-    compared. All others are held against the recorded run where the report is proved.
+    compared. All others are held against the recorded run where the report is proved, and printed
+    again too where evidence is derived again (`gates.rederive`): a record may have been made anew.
 
     Raises:
         GenpolicyError: A report or its evidence cannot be read.

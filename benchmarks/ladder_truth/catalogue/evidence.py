@@ -76,6 +76,12 @@ def _unjudged(workspace: Path) -> None:
     (folder / "extra.mcap").write_bytes(b"nobody judged this")
 
 
+def _page_says_pass(workspace: Path) -> None:
+    """The page of Gate A names a verdict that no gate gave."""
+    page = workspace / "reports/gate_a.html"
+    page.write_text(page.read_text() + "<p>Gate D: PASS</p>\n")
+
+
 WRONGS = (
     Wrong("bit_in_the_dataset", "evidence",
           "One bit of the audited frames is flipped; size and times stay.",
@@ -159,6 +165,11 @@ WRONGS = (
           Expected("D", refusal=r"its drill was due .* had none"),
           note="Took the place of `pushes_that_never_come`: the small ladder pushes nobody, "
                "so that nothing had been planted."),
+    Wrong("page_and_lock_forged", "evidence",
+          "The printed page of Gate A says more than its report, and that is committed.",
+          "small", all_of(_page_says_pass, committed("gate_a")),
+          Expected("A", refusal=r"reports/gate_a\.html is another page"),
+          note="Added with the check that prints recorded pages again."),
     Wrong("a_file_beside_signed_evidence", "evidence",
           "A journal lies beside those on which a signed card stands.",
           "signed", _unjudged, Expected("E", ("upstream_passed",), refusal=r"extra\.mcap")),

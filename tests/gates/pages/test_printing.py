@@ -1,10 +1,14 @@
 """What is printed beside a report: whole, the same again, and any other byte is named."""
 
+import json
 import shutil
 
 import pytest
 
+from gates import rederive
 from gates.pages.printing import differing, printed_beside
+from gates.pipeline import Disk, changed_pages
+from gates.proof import Rung
 from gates.report import report_path
 from gates.writing import changed_page, write_gate
 
@@ -82,3 +86,35 @@ def test_what_a_record_holds_is_left_to_it(again):
     pages = {"reports/gate_d.md", "reports/gate_d.html"}
     assert differing(root, report, recorded=folder | pages) == ""
     assert differing(root, report, recorded=frozenset(pages)) == ROWS
+
+
+@pytest.mark.parametrize(
+    "name", ["reports/gate_d.md", "reports/gate_d.html", "reports/gate_d/criteria.csv"]
+)
+def test_a_page_that_was_changed_and_recorded_anew_is_refused_where_all_is_derived_again(
+    again, monkeypatch, name
+):
+    """As `dvc commit gate_d` does, so that no record shows it: what is printed is printed again."""
+    root, _ = again
+    monkeypatch.setattr(rederive, "_evidence", lambda root, gate: None)  # it has no journals
+    rung = Rung("D", "stress", "PASS", "", "", report_path("D"), 0)
+
+    def recorded():
+        places = ("reports/gate_d.md", "reports/gate_d.html", "reports/gate_d")
+        disk = Disk(root, {})
+        lock = json.loads((root / "dvc.lock").read_text())
+        outs = [{"path": place, "md5": disk.md5(place)} for place in places]
+        lock["stages"]["gate_d"] = {"cmd": "gate", "outs": outs}
+        (root / "dvc.lock").write_text(json.dumps(lock))
+
+    recorded()
+    assert rederive.rederived(root, [rung]) == [rung]
+    (root / name).write_bytes((root / name).read_bytes().replace(b"0", b"9", 1))
+    recorded()
+    assert changed_pages(root, "D") == changed_page(root) == ""
+    (refused,) = rederive.rederived(root, [rung])
+    assert (refused.verdict, refused.exit_code) == ("REFUSED", 3)
+    assert refused.note.startswith(f"Gate D refuses: {name} is another page, required the one that")
+    assert "dvc repro -f gate_d" in refused.note
+    (root / report_path("D")).unlink()
+    assert rederive.rederived(root, [rung]) == [rung], "without a report there is none to compare"
