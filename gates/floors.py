@@ -95,6 +95,8 @@ BOUNDS: tuple[Bound, ...] = (
     *_counts("A", "a recording that vanished may be the one that fails", FOUND),
     *_counts("A", "a comparison with other settings compares nothing", "baselines_matched"),
     Bound("A", "cause_accepted", ">=", 1.0, "modes of another cause are no reason for a generator"),
+    Bound("A", "told_share", "<=", 0.7, "who is right 17 times of 20 has seen the choice"),
+    Bound("A", "remedy_valid_share", "<=", 0.9, "what is valid nine times of ten is the policy"),
     *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
     *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
     *_counts("B", "numbers that mean something else command something else", "conformance"),

@@ -19,7 +19,7 @@ EXECUTED = {
 }  # fmt: skip
 GOLDEN = {
     "A": {"data_defects": 0, "refused_recordings_accounted": 0, "baselines_matched": 0,
-          "cause_accepted": 1},
+          "cause_accepted": 1, "told_share": 0.7, "remedy_valid_share": 0.9},
     "B": {"unpinned_items": 0, "metadata_mismatches": 0, "nfe_mismatch": 0,
           "nonfinite_weights": 0, "conformance": 0, "samples_difference": 1e-5,
           "varied_difference": 1e-4,
@@ -82,6 +82,7 @@ def test_who_drills_or_plans_a_recovery_does_not_lack_one():
     assert not lacks(stress=_conditions(recovery_drill={}), execution=nowhere)
     assert not lacks(stress=_conditions(recovery_drill=None))
     assert not lacks(stress=_conditions(called={"kind": "recovery_drill"}))
+    # The kind is what counts; the settings of the stage refuse this name of another kind.
     assert lacks(stress=_conditions(recovery_drill={"kind": "nominal"}))
     plans = {"default": [], "approach": ["retreat"]}
     assert not lacks(stress=_conditions(nominal={}), execution={"recovery_plans": plans})
