@@ -158,7 +158,9 @@ def test_too_few_episodes_decide_nothing():
 @pytest.mark.parametrize(
     ("decided_by", "fidelity", "names"),
     [("object", 0.6, {"object"}), ("habit", 0.7, {"previous_episodes", "unrecorded"}),
-     ("drift", 0.8, {"episode_order", "calibration_epoch", "everything_together"})],
+     ("drift", 0.8, {"episode_order", "calibration_epoch", "everything_together"}),
+     ("operator", 0.6, {"operator", "recording_sequence", "everything_together"}),
+     ("session", 0.6, {"recording_sequence"})],
 )  # fmt: skip
 def test_four_right_of_five_are_no_valid_modes(decided_by, fidelity, names):
     plan = planned(decided_by=decided_by, fidelity=fidelity, goal_half_width_m=0.004)
