@@ -118,9 +118,17 @@ def test_a_finished_ladder_shows_no_stop_and_a_fail_is_one(finished: Path, tmp_p
     assert {stop.gate for stop in look(tmp_path, "small").stops} == {"A"}
 
 
+AREAS = {
+    "data", "labels", "leakage", "training", "checkpoint", "sampler", "projection", "queue",
+    "supervisor", "evidence", "code", "limits", "signatures", "brought policies",
+}  # fmt: skip
+"""What can be wrong with a ladder; of each something is planted."""
+
+
 def test_the_catalogue_is_large_enough_and_names_are_asked_for_exactly() -> None:
     assert len(WRONGS) >= 60
     assert len(HONEST) >= 20
+    assert {w.area for w in WRONGS} == AREAS
     assert {w.base for w in WRONGS} == {"small", "brought", "signed"}
     assert [item.name for item in chosen(["two_cards"], [])] == ["two_cards"]
     with pytest.raises(SystemExit, match="no_such_wrong"):
