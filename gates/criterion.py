@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gates.report import Comparison
+from gates.report import Comparison, Recount
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Measured:
             empty where more of the same evidence does.
         point: What was seen, where `value` is an end of an interval over independent units, as
             `counted` says them; says how many more would decide, and is never judged.
+        recount: Which rows it counts, so that a reader counts them again.
     """
 
     value: float | None
@@ -36,6 +37,7 @@ class Measured:
     counted: str = ""
     undecided: str = ""
     point: float | None = None
+    recount: Recount | None = None
 
 
 @dataclass(frozen=True)

@@ -50,5 +50,10 @@ def named(items: Sequence[str]) -> str:
 
 
 def sentence(text: str) -> str:
-    """Words as a sentence: its first letter large, and an end."""
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    """Words as a sentence: its first letter large, and an end.
+
+    A name at its head stays as it is: one with an underscore, or one before a colon.
+    """
+    first = text.partition(" ")[0]
+    head = text[:1] if "_" in first or first.endswith(":") else text[:1].upper()
+    return head + text[1:] + ("" if text.endswith(".") else ".")

@@ -70,10 +70,10 @@ def _waived(report: GateReport, answer: Answer) -> list[str]:
 def cold_start(report: GateReport) -> Iterator[Doubt]:
     """The first answer after a start is left out of the bound of the others."""
     for answer in report.criteria:
-        if found := re.search(rf"cold at most (\S+) s, {TOO_OLD} of (\S+) s", answer.caveat):
+        if found := re.search(rf"cold at most (\S+ m?s), {TOO_OLD} of (\S+ m?s)", answer.caveat):
             text = (
-                f"the first answer after a start takes up to {found[1]} s and is not judged; "
-                f"nothing older than {found[2]} s is executed, so that the robot waits for another"
+                f"the first answer after a start takes up to {found[1]} and is not judged; "
+                f"nothing older than {found[2]} is executed, so that the robot waits for another"
             )
             yield about(report, "cold start", answer, text)
 
@@ -81,10 +81,9 @@ def cold_start(report: GateReport) -> Iterator[Doubt]:
 def an_average(report: GateReport) -> Iterator[Doubt]:
     """A gain over all conditions that one of them does not share."""
     for answer in report.criteria:
-        found = re.search(rf"{WORST} (\S+) (-\S+) over", answer.caveat)
+        found = re.search(rf"{WORST} (\S+) (-\S+ points) over", answer.caveat)
         if found and answer.verdict == "PASS":
-            points = f"{100 * float(found[2]):.3g} points"
-            text = f"it holds for the mean over all conditions; in {found[1]} it is {points}"
+            text = f"it holds for the mean over all conditions; in {found[1]} it is {found[2]}"
             yield about(report, "an average", answer, text)
 
 

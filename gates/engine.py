@@ -251,6 +251,7 @@ def _answer(
         evidence=tuple(touched),
         caveat=caveat,
         counted=measured.counted,
+        recount=measured.recount,
     )
 
 

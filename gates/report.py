@@ -44,6 +44,32 @@ class StrictModel(BaseModel):
 Model = TypeVar("Model", bound=StrictModel)
 
 
+class Recount(StrictModel):
+    """How a number is counted again from the rows of a table.
+
+    Attributes:
+        table: Path of the table.
+        method: Whose rows they are; empty where they are of several, or of none.
+        where: What holds of each row that counts, as it is typed into a filter; empty where all do.
+        columns: Columns that this needs.
+        of: Column that is added up to the whole; empty where rows are counted.
+        whole: The rows, or the sum over them.
+        hits: What holds, further, of each row that is a hit.
+        summed: Columns that are added up to the part.
+        part: The hits, or the sum over the rows; None where rows alone are counted.
+    """
+
+    table: str
+    method: str
+    where: tuple[str, ...]
+    columns: tuple[str, ...]
+    of: str
+    whole: float
+    hits: tuple[str, ...]
+    summed: tuple[str, ...]
+    part: float | None
+
+
 class Answer(StrictModel):
     """One criterion of a gate, answered.
 
@@ -59,6 +85,7 @@ class Answer(StrictModel):
         evidence: Files that were read for the number, relative to the repository.
         caveat: What the reader must know about this number.
         counted: The independent units that the number rests on; empty where it counts none.
+        recount: How its rows are found and counted again; None where it counts no rows of a table.
     """
 
     id: str
@@ -74,6 +101,7 @@ class Answer(StrictModel):
     evidence: tuple[str, ...]
     caveat: str
     counted: str
+    recount: Recount | None = None
 
 
 class Overridden(StrictModel):

@@ -47,6 +47,7 @@ class Answer:
         note: Where, or why it is not known.
         interval: Interval of the number, where it has one.
         counted: The units that the number rests on; empty where it counts none.
+        mode: The one mode that it counts; empty where it is about several, or none.
     """
 
     question: str
@@ -59,6 +60,7 @@ class Answer:
     note: str = ""
     interval: tuple[float, float] | None = None
     counted: str = ""
+    mode: str = ""
 
     @property
     def holds(self) -> bool | None:

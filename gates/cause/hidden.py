@@ -6,6 +6,7 @@ from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.told import HISTORY, SEQUENCE, UNRECORDED, teller, told
+from gates.words import percent
 from genpolicy.audit.rows import Stratum
 from genpolicy.audit.variable import EPISODE_VARIABLES, INSIDE
 
@@ -94,7 +95,7 @@ def _answer(row: Stratum, limits: CauseLimits) -> Answer:
     lower, upper = _number(row.effect_lower), _number(row.effect_upper)
     seen = ", which the policy sees" if row.observed else ""
     detail = f"{row.detail}; " if row.detail else ""
-    begins = f", its interval begins at {lower:.2f}"
+    begins = f", its interval begins at {percent(lower)}"
     unsure = begins if _reaches_chance(row, limits) else ""
     return Answer(
         "strata_effect", Topic.HIDDEN,

@@ -27,6 +27,7 @@ from gates.cause.numbers import Numbers, Residual
 from gates.cause.reading import folder_numbers
 from gates.cause.structure import structure, support
 from gates.cause.validity import beside_the_choice, found_words, validity
+from gates.words import percent, share_of
 from genpolicy.errors import ConfigError
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -156,7 +157,7 @@ def _agreement(
         "resampled audits that name the same cause, of those that name one",
         same / total if total else None,
         limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
-        note=f"{same} of {total}; {len(draws) - total} leave it open",
+        note=f"{share_of(same, total)}; {len(draws) - total} leave it open",
     )  # fmt: skip
     if not answer.red:
         return answer, None
@@ -259,7 +260,7 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
         what="labels that disagree with a replay, upper bound",
         measured=ends[1] if known else None,
         limit=limit if known else None,
-        note=f"{labels.disagreements} of {labels.replays} replayed"
+        note=share_of(labels.disagreements, labels.replays, "replayed")
         if known
         else "no replay: labels are taken as they are",
         interval=ends if known else None,
@@ -270,7 +271,7 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
     if labels.disagreements == 0:
         text = (
             f"Replay more episodes: {labels.replays} without a disagreement only show a share "
-            f"below {ends[1]:.3f}."
+            f"below {percent(ends[1])}."
         )
         return [answer], Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "replay", text)
     text = (

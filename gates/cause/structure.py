@@ -7,6 +7,7 @@ from gates.cause.components import components, looked_in, trembling, unreadable
 from gates.cause.hidden import OBSERVED, hidden, told_by_episode
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, turned
+from gates.words import percent, share_of
 from genpolicy.audit.reach_rows import LEARNED, LOCAL, Reach
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -50,7 +51,7 @@ def _enough(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
             question, Topic.SUPPORT, f"{which} {what}", measured, limits[question], ">=", note=note
         )
 
-    share = f"{counts.analysed} of {counts.queries}"
+    share = share_of(counts.analysed, counts.queries)
     return [
         least("supported_episodes", "held-out episodes with", counts.analysed_episodes),
         least("held_out_situations", "held-out situations with", counts.analysed),
@@ -148,7 +149,8 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
         "persistence_margin", Topic.STRUCTURE,
         "episodes that keep their mode a chunk later, beyond what chance reaches in 95 of 100",
         kept.observed - kept.null_q95 if kept.n else None, limits["persistence_margin"], ">=",
-        note=f"{kept.observed:.2f} against {kept.null_q95:.2f}" if kept.n else "not measured",
+        note=f"{percent(kept.observed)} against {percent(kept.null_q95)}" if kept.n
+        else "not measured",
         counted=f"{kept.n} situations",
     )  # fmt: skip
     persistent = Answer(
@@ -249,7 +251,7 @@ def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
     ]  # fmt: skip
     if numbers.reach:
         least = min(numbers.reach, key=lambda row: (row.share, row.fifth))
-        listed = ", ".join(f"{row.share:.2f}" for row in numbers.reach)
+        listed = ", ".join(percent(row.share) for row in numbers.reach)
         answers.append(
             Answer(
                 "denial_share", Topic.STRUCTURE,
@@ -270,7 +272,7 @@ def _few(numbers: Numbers, limits: CauseLimits) -> Answer:
         "two_mode_chance", Topic.STRUCTURE,
         "share of held-out episodes with several modes, lower bound", lower,
         limits["two_mode_chance"], "<=",
-        note=f"{counts.two_mode_episodes} of {counts.primary_episodes}",
+        note=share_of(counts.two_mode_episodes, counts.primary_episodes),
     )  # fmt: skip
 
 
@@ -278,7 +280,7 @@ def _falling_apart(numbers: Numbers, limits: CauseLimits, apart: float) -> Answe
     counts = numbers.counts
     return Answer(
         "incoherent_share", Topic.STRUCTURE, "share of situations whose clusters fall apart",
-        apart, limits["incoherent_share"], "<=", note=f"{counts.incoherent} of {counts.analysed}",
+        apart, limits["incoherent_share"], "<=", note=share_of(counts.incoherent, counts.analysed),
     )  # fmt: skip
 
 

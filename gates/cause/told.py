@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Topic
 from gates.cause.limits import CauseLimits
+from gates.words import percent
 from genpolicy.audit.rows import Prediction
 
 QUESTION = "told_share"
@@ -47,8 +48,8 @@ def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
             QUESTION, Topic.HIDDEN,
             f"what {row.variable.replace('_', ' ')} tells of the mode, beyond a guess",
             _judged(row, limit), limit if counts(row, rows, limit) else None,
-            note=f"{row.told:.2f} ({row.told_lower:.2f} to {row.told_upper:.2f}) in {row.phase}, "
-            f"{row.n} held-out episodes; {_end(row, limit)}",
+            note=f"{percent(row.told)} ({percent(row.told_lower)} to {percent(row.told_upper)}) in "
+            f"{row.phase}, {row.n} held-out episodes; {_end(row, limit)}",
         )
         for row in ranked[:SHOWN]
     ]  # fmt: skip

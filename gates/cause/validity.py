@@ -8,6 +8,7 @@ from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.structure import thin
 from gates.cause.told import QUESTION
+from gates.words import share_of
 from genpolicy.audit.rows import ModeOutcome
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -161,7 +162,8 @@ def _starts(numbers: Numbers) -> list[set[str]]:
 
 
 def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:
-    return _success_of(mode.mode, mode.successes, mode.episodes, limits)
+    found = _success_of(mode.mode, mode.successes, mode.episodes, limits)
+    return replace(found, mode=mode.mode)
 
 
 def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) -> Answer:
@@ -169,7 +171,7 @@ def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) ->
     return Answer(
         "mode_success_lower", Topic.VALIDITY, f"success of {who}, lower bound",
         ends[0] if known else None, limits["mode_success_lower"], ">=",
-        note=f"{successes} of {episodes} succeed" if known else "not recorded",
+        note=f"{share_of(successes, episodes, 'episodes')} succeed" if known else "not recorded",
         interval=ends if known else None, counted=f"{successes} of {episodes} episodes",
     )  # fmt: skip
 
@@ -183,8 +185,8 @@ def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer:
     return Answer(
         "mode_feasible_share", Topic.VALIDITY, f"feasible chunks of {mode.mode}",
         mode.admissible / mode.checked if known else None, limits["mode_feasible_share"], ">=",
-        note=f"{mode.admissible} of {mode.checked}" if known else "no chunk was checked",
-        counted=f"{mode.admissible} of {mode.checked} chunks",
+        note=share_of(mode.admissible, mode.checked, "chunks") if known else "no chunk was checked",
+        counted=f"{mode.admissible} of {mode.checked} chunks", mode=mode.mode,
     )  # fmt: skip
 
 

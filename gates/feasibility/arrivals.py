@@ -9,7 +9,11 @@ from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.settings import HELD_OUT, SHADOW, FeasibilitySettings
+from gates.recount import Subset
+from gates.words import percent
 from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
+
+STUB = f"{SHADOW}/stub.parquet"
 
 
 @criterion(
@@ -21,8 +25,7 @@ from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 )
 def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Stale actions that arrived at the stub."""
-    bad, arrivals = _stub(evidence, settings, candidate, "stale")
-    return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals")
+    return _stub(evidence, settings, candidate, "stale")
 
 
 @criterion(
@@ -60,15 +63,18 @@ def require_played(rows: pd.DataFrame, column: str, planned: Iterable[str]) -> N
 
 
 def _played(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> pd.DataFrame:
-    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    rows = evidence.of(STUB, ShadowStubRow, candidate)
     require_played(rows, "fixture", (HELD_OUT, *settings.required_fixtures))
     return rows
 
 
 def _stub(
-    evidence: Evidence, settings: FeasibilitySettings, candidate: str, *columns: str
-) -> tuple[float, float]:
-    return at_the_stub(_played(evidence, settings, candidate), *columns)
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str, column: str
+) -> Measured:
+    rows = _played(evidence, settings, candidate)
+    bad, arrivals = at_the_stub(rows, column)
+    recount = Subset(STUB).summed(rows, (column,), "arrivals")
+    return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals", recount=recount)
 
 
 @criterion(
@@ -80,8 +86,7 @@ def _stub(
 )
 def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Actions of no admitted chunk that arrived at the stub."""
-    bad, arrivals = _stub(evidence, settings, candidate, "invalid")
-    return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals")
+    return _stub(evidence, settings, candidate, "invalid")
 
 
 @criterion(
@@ -110,7 +115,7 @@ def stub_violation_upper(
     if bad == 0 and limit and limit.limit is not None and not interval[1] <= limit.limit:
         raise MissingEvidenceError(
             f"none bad of {observations:g} observations that delivered bounds it by "
-            f"{interval[1]:.4g} only"
+            f"{percent(interval[1])} only"
         )
     text = f"{bad:g} of {observations:g} observations that delivered; exact upper bound"
     counted = f"{bad:g} of {observations:g} observations"

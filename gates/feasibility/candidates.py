@@ -1,12 +1,14 @@
 """The sampled chunks: how many the six layers admit, by mode, and what projection did to them."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
 from gates.asked_for import REFUSED_FOR
 from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.criterion import Measured, criterion
-from gates.evidence import Array, Evidence, MissingEvidenceError, flags, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.feasibility.settings import (
     CANDIDATES,
     HELD_OUT,
@@ -19,11 +21,18 @@ from gates.feasibility.settings import (
     UNKNOWN,
     FeasibilitySettings,
 )
+from gates.recount import NotAll, Subset, all_hold, is_none, is_one
+from gates.words import length, number, percent, share_of, three
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.statistics.intervals import clopper_pearson
 
 ODD_SHARE = 0.125
 """One sample of eight, as at Gate B: what fewer episodes come by is a mode by luck."""
+ADMISSIBLE = (is_one("outcome", PASSED), *(is_one(layer, True) for layer in LAYERS))
+"""Of a candidate that passed all six layers."""
+HELD_OUT_ROWS = Subset(CANDIDATES, (is_one("fixture", HELD_OUT),))
+CORRUPTED_ROWS = Subset(CANDIDATES, (is_none("fixture", *INTACT),))
+REFUSED_BY_NAME = (NotAll(ADMISSIBLE), is_one("first_reason", *REASONS))
 
 
 def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
@@ -31,8 +40,7 @@ def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
 
 
 def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
-    rows = _rows(evidence, candidate)
-    rows = rows[rows["fixture"] == HELD_OUT]
+    rows = HELD_OUT_ROWS.of(_rows(evidence, candidate))
     if len(rows) == 0:
         raise MissingEvidenceError("no held-out observation was sampled")
     return rows
@@ -46,10 +54,7 @@ def episodes_of(rows: pd.DataFrame) -> pd.Series:
 
 def admissible(rows: pd.DataFrame) -> Array:
     """1.0 where a candidate passed all six layers; one not reached or unknown is not passed."""
-    passed = np.array(rows["outcome"] == PASSED, dtype=np.bool_)
-    for layer in LAYERS:
-        passed &= flags(rows, layer)
-    return passed.astype(np.float64)
+    return all_hold(ADMISSIBLE, rows).astype(np.float64)
 
 
 def _unknown(rows: pd.DataFrame) -> str:
@@ -93,8 +98,11 @@ def mode_admissible_gap(
         )
     shares = {m: (p["admissible"].to_numpy(), p["episode"].tolist()) for m, p in by_mode.items()}
     interval, more, less = widest_gap(shares, confidence=settings.confidence)
-    text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
-    text += f" episodes answered in several modes; upper bound of {more} minus {less}{said}"
+    text = ", ".join(
+        f"{m} {share_of(p['admissible'].sum(), len(p), 'candidates')} of {seen[m]} episodes"
+        for m, p in by_mode.items()
+    )
+    text += f", that are answered in several modes; upper bound of {more} minus {less}{said}"
     counted = f"{min(seen.values())} episodes of the rarer mode"
     gap = float(np.mean(shares[more][0]) - np.mean(shares[less][0]))
     return Measured(interval[1], interval, text, counted=counted, point=gap)
@@ -113,7 +121,7 @@ def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], 
     if not few or not most <= ODD_SHARE:
         return [], ""
     named = ", ".join(f"{mode} in {len(own)}" for mode, own in few.items())
-    return list(few), f"; left out: {named} episodes, together at most {most:.3g} of all"
+    return list(few), f"; left out: {named} episodes, together at most {percent(most)} of all"
 
 
 @criterion(
@@ -129,13 +137,15 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
     share, lower, upper = share_interval(
         admissible(rows), episodes.to_numpy(), confidence=settings.confidence, favourable=True
     )
+    recount = HELD_OUT_ROWS.counted(rows, *ADMISSIBLE)
     text = (
-        f"share {share:.4g} of {len(rows)} candidates at {rows['observation'].nunique()} "
-        f"observations; lower bound over {episodes.nunique()} episodes, whose observations are "
-        f"not independent{_unknown(rows)}"
+        f"{share_of(recount.part or 0.0, recount.whole, 'candidates')} at "
+        f"{number(rows['observation'].nunique())} observations; lower bound over "
+        f"{number(episodes.nunique())} episodes, whose observations are not "
+        f"independent{_unknown(rows)}"
     )
     counted = f"{episodes.nunique()} episodes"
-    return Measured(lower, (lower, upper), text, counted=counted, point=share)
+    return Measured(lower, (lower, upper), text, counted=counted, recount=recount, point=share)
 
 
 @criterion(
@@ -146,7 +156,7 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
 )
 def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Upper bound of the move by projection that 95 % of the admissible candidates keep, m."""
-    return _of_admissible(evidence, settings, candidate, "position_change_m")
+    return _of_admissible(evidence, settings, candidate, "position_change_m", length)
 
 
 @criterion(
@@ -159,14 +169,22 @@ def boundary_jerk_p95_m_s3(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
     """Upper bound of the jerk at the boundary that 95 % of the admissible keep, m/s^3."""
-    return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
+    return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3", _jerk)
+
+
+def _jerk(value_m_s3: float) -> str:
+    return f"{three(value_m_s3)} m/s^3"
 
 
 def _of_admissible(
-    evidence: Evidence, settings: FeasibilitySettings, candidate: str, column: str
+    evidence: Evidence,
+    settings: FeasibilitySettings,
+    candidate: str,
+    column: str,
+    said: Callable[[float], str],
 ) -> Measured:
-    rows = _held_out(evidence, candidate)
-    rows = rows[admissible(rows) == 1.0]
+    subset = Subset(CANDIDATES, (*HELD_OUT_ROWS.terms, *ADMISSIBLE))
+    rows = subset.of(_held_out(evidence, candidate))
     if len(rows) == 0:
         raise MissingEvidenceError("no candidate is admissible")
     values = np.abs(numbers(rows, column))
@@ -179,11 +197,13 @@ def _of_admissible(
         rng=settings.draws("C", column, candidate),
     )
     text = (
-        f"p95 {point:.4g}, largest {values.max():.4g}; {len(rows)} admissible candidates of "
-        f"{rows['observation'].nunique()} held-out observations in {episodes.nunique()} episodes"
+        f"95 % are at most {said(point)}, the largest is {said(values.max())}; "
+        f"{number(len(rows))} admissible candidates of {number(rows['observation'].nunique())} "
+        f"held-out observations in {number(episodes.nunique())} episodes"
     )
     counted = f"{episodes.nunique()} episodes"
-    return Measured(interval[1], interval, text, counted=counted, point=point)
+    recount = subset.counted(rows)
+    return Measured(interval[1], interval, text, counted=counted, recount=recount, point=point)
 
 
 @criterion(
@@ -196,21 +216,20 @@ def corrupted_refused_share(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
     """Share of corrupted candidates that are refused with one of the known reasons."""
-    rows = _rows(evidence, candidate)
-    rows = rows[~rows["fixture"].isin(INTACT)]
+    rows = CORRUPTED_ROWS.of(_rows(evidence, candidate))
     absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
-    named = rows["first_reason"].isin(REASONS).to_numpy()
-    refused = (admissible(rows) == 0.0) & named
+    refused = all_hold(REFUSED_BY_NAME, rows)
     interval = counted_interval(
         float(refused.sum()), float(len(rows)), confidence=settings.confidence
     )
     through = sorted(set(rows.loc[~refused, "fixture"]))
-    text = f"{len(rows)} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
+    text = f"{number(len(rows))} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
         f"; let through or refused without reason: {', '.join(through)}" if through else ""
     )
     own = rows["first_reason"] == rows["fixture"].map(REFUSED_FOR)
     text += f"; {int((refused & ~own).sum())} refused for another reason than their fixture's own"
     counted = f"{refused.sum()} of {len(rows)} candidates"
-    return Measured(float(refused.mean()), interval, text, counted=counted)
+    recount = CORRUPTED_ROWS.counted(rows, *REFUSED_BY_NAME)
+    return Measured(float(refused.mean()), interval, text, counted=counted, recount=recount)

@@ -1,6 +1,7 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
 from gates.cause import (
+    Answer,
     Cause,
     CauseLimits,
     deciding_answer,
@@ -16,11 +17,22 @@ from gates.cause.reading import Documents, Rows
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
+from gates.recount import Differs, Subset, is_one
+from gates.report import Recount
 from gates.settings import PARAMS_FILE, Limit, Limits, Waiver
+from genpolicy.audit.rows import ModeOutcome, ReplayRow
 from genpolicy.documents.document import Content, Document
 from genpolicy.errors import BadInputError
 
 PLACE = f"{PARAMS_FILE}: gate_a.cause"
+MODES, REPLAYED = f"{AUDIT}/modes.parquet", f"{AUDIT}/replay.parquet"
+DISAGREE = Differs("label", "replayed")
+"""Of a replayed episode: its label says otherwise."""
+OF_A_MODE = {
+    "mode_success_lower": (("successes",), "episodes"),
+    "mode_feasible_share": (("admissible",), "checked"),
+}
+"""Columns that a number of one mode is a share of."""
 
 
 def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
@@ -68,7 +80,26 @@ def as_the_cause(
     unit = numbers.metre if question in IN_METRES else 1.0
     text = "; ".join(filter(None, [answer.what, answer.note, also]))
     interval = answer.interval and (answer.interval[0] / unit, answer.interval[1] / unit)
-    return Measured(answer.measured / unit, interval, text, counted=answer.counted)
+    return Measured(
+        answer.measured / unit,
+        interval,
+        text,
+        counted=answer.counted,
+        recount=_recount(answer, evidence),
+    )
+
+
+def _recount(answer: Answer, evidence: Evidence) -> Recount | None:
+    """Where the number of one mode, or of the labels, is counted again."""
+    if answer.question == "label_disagreement":
+        return Subset(REPLAYED).counted(evidence.rows(REPLAYED, ReplayRow), DISAGREE)
+    if not answer.mode:
+        return None
+    subset = Subset(MODES, (is_one("mode", answer.mode),))
+    rows = subset.of(evidence.rows(MODES, ModeOutcome))
+    if len(rows) != 1:  # another phase has a mode of the same name
+        return None
+    return subset.summed(rows, *OF_A_MODE[answer.question])
 
 
 def _limits(settings: NeedSettings) -> CauseLimits:

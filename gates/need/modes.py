@@ -6,15 +6,16 @@ import pandas as pd
 from gates.bounds import share_interval
 from gates.cause import CauseName
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.need.cause import as_the_cause, asked, found_cause
 from gates.need.settings import AUDIT, NeedSettings
+from gates.recount import AtLeast, Subset, all_hold, is_one
+from gates.words import number, share_of
 from genpolicy.audit.rows import RecoveryOutcome, SituationRow
 
-
-def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
-    frame = evidence.rows(f"{AUDIT}/neighbourhoods.parquet", SituationRow)
-    return frame[frame["split"].isin(settings.held_out_splits)]
+SITUATIONS = f"{AUDIT}/neighbourhoods.parquet"
+DEFEATED = (AtLeast("modes_admissible", "clusters"), is_one("mean_admissible", False))
+"""Of a situation with two modes: each passes, and the mean does not."""
 
 
 @criterion(
@@ -82,7 +83,7 @@ def _recovered(evidence: Evidence) -> str:
         return "no disturbed demonstration is known"
     counts = frame.groupby("mode")[["successes", "episodes"]].sum()
     by_mode = ", ".join(
-        f"{mode} {int(good)} of {int(episodes)}"
+        f"{mode} {share_of(good, episodes)}"
         for mode, (good, episodes) in zip(counts.index, counts.to_numpy(), strict=True)
     )
     return f"disturbed demonstrations that recovered (shown, not judged): {by_mode}"
@@ -105,24 +106,24 @@ def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lower bound of the share of two-mode situations in which only the mean is rejected."""
-    rows = _compared(evidence, settings, "mean")
+    subset, rows = _compared(evidence, settings, "mean")
     if len(rows) == 0:
         return Measured(0.0, caveat="no held-out situation has two modes")
-    valid = numbers(rows, "modes_admissible") >= numbers(rows, "clusters")
-    defeated = valid & ~flags(rows, "mean_admissible")
     share, lower, upper = share_interval(
-        defeated,
+        all_hold(DEFEATED, rows),
         list(rows["episode_uuid"]),
         confidence=settings.confidence,
         favourable=True,
     )
     episodes = rows["episode_uuid"].nunique()
+    recount = subset.counted(rows, *DEFEATED)
     text = (
-        f"share {share:.4g} of {len(rows)} situations; lower bound over {episodes} episodes, whose "
-        f"situations are not independent; {_median(evidence, settings)}"
+        f"{share_of(recount.part or 0.0, recount.whole, 'situations')}; lower bound over "
+        f"{number(episodes)} episodes, whose situations are not independent; "
+        f"{_median(evidence, settings)}"
     )
     counted = f"{episodes} episodes"
-    return Measured(lower, (lower, upper), text, counted=counted, point=share)
+    return Measured(lower, (lower, upper), text, counted=counted, recount=recount, point=share)
 
 
 def _median(evidence: Evidence, settings: NeedSettings) -> str:
@@ -132,20 +133,24 @@ def _median(evidence: Evidence, settings: NeedSettings) -> str:
     so wherever each mode is valid it passes: no task with modes could meet a limit on it. What
     learns it is the absolute error, and that is judged.
     """
-    rows = _compared(evidence, settings, "median")
+    _, rows = _compared(evidence, settings, "median")
     passed = int(np.sum(flags(rows, "median_admissible")))
-    return f"the median of the neighbours passes in {passed} of {len(rows)} (shown, not judged)"
+    share = share_of(passed, len(rows))
+    return f"the median of the neighbours passes in {share} (shown, not judged)"
 
 
-def _compared(evidence: Evidence, settings: NeedSettings, which: str) -> pd.DataFrame:
+def _compared(
+    evidence: Evidence, settings: NeedSettings, which: str
+) -> tuple[Subset, pd.DataFrame]:
     """Held-out two-mode situations in which the mean or the median was checked.
 
     Raises:
         MissingEvidenceError: It was not, in one of them.
     """
     column = f"{which}_admissible"
-    rows = _held_out(evidence, settings)
-    rows = rows[flags(rows, "two_mode")]
+    splits = is_one("split", *settings.held_out_splits)
+    subset = Subset(SITUATIONS, (splits, is_one("two_mode", True)))
+    rows = subset.of(evidence.rows(SITUATIONS, SituationRow))
     if rows[column].isna().any():
         raise MissingEvidenceError(f"the {which} was not checked in every two-mode situation")
-    return rows
+    return subset, rows

@@ -5,6 +5,7 @@ history would have done; a simple policy covers the modes. Each is one number wi
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -20,11 +21,19 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
+from gates.recount import AtLeast, Subset, Term, all_hold, is_one
+from gates.report import Recount
+from gates.words import length, number, percent, share_of, three
 from genpolicy.evidence.documents.given import VARIANTS, TrainedVariant
 from genpolicy.evidence.documents.need import LATENT
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 
 MODES = f"{MEASURED}/modes.parquet"
+FACTOR_MODES = f"{MEASURED_FACTORS}/modes.parquet"
+TWO_MODES = AtLeast("modes_present", 2)
+"""Of a situation: the demonstrations parted in it."""
+VALID = (AtLeast("admissible", "samples"), AtLeast("modes_covered", 1))
+"""Of a situation: every sample passes all six layers, and some mode is reached."""
 
 
 @criterion(
@@ -45,14 +54,22 @@ def baselines_matched(evidence: Evidence, settings: NeedSettings) -> Measured:
 def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper bound of the share of situations in which the chunked baseline acts validly."""
     method = settings.chunked_baseline
+    deployed = is_one("convention", *settings.deployed_conventions)
     rows = evidence.of(MODES, ModeRow, method)
-    rows = rows[rows["convention"].isin(settings.deployed_conventions)]
-    share, lower, upper, (count, episodes) = valid_share(rows, confidence=settings.confidence)
+    found = valid_share(MODES, rows, deployed, confidence=settings.confidence)
     text = (
-        f"{method} reaches a mode with an admissible chunk in {share:.4g} of {count} situations; "
-        "upper bound over episodes"
+        f"an admissible chunk of {method} reaches a mode in {found.said}; upper bound over "
+        f"{number(found.episodes)} episodes"
     )
-    return _bounded(share, (lower, upper), text, episodes)
+    counted = f"{found.episodes} episodes"
+    return Measured(
+        found.upper,
+        (found.lower, found.upper),
+        text,
+        counted=counted,
+        recount=found.recount,
+        point=found.share,
+    )
 
 
 @criterion(
@@ -73,10 +90,9 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     # As many chances to look valid as there are remedies: the level is divided among them.
     confidence = 1.0 - (1.0 - settings.confidence) / len(settings.remedies)
     bounds = []
+    subset = Subset(MODES, (is_one("convention", *settings.deployed_conventions), TWO_MODES))
     for method in (*settings.remedies, settings.one_mode):
-        rows = evidence.of(MODES, ModeRow, method)
-        rows = rows[rows["convention"].isin(settings.deployed_conventions)]
-        rows = rows[numbers(rows, "modes_present") >= 2]
+        rows = subset.of(evidence.of(MODES, ModeRow, method))
         if len(rows) == 0:
             raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
         share, lower, upper = share_interval(
@@ -85,18 +101,20 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
             confidence=confidence,
             favourable=False,
         )
-        sizes = (len(rows), rows["episode_uuid"].nunique())
-        bounds.append((upper, lower, share, method, sizes))
+        bounds.append((upper, lower, share, method, rows))
     *judged, shown = bounds
-    upper, lower, share, method, (count, episodes) = max(judged)
-    each = ", ".join(f"{name} {value:.3g}" for _, _, value, name, _ in judged)
+    upper, lower, share, method, rows = max(judged, key=lambda one: one[:4])
+    each = ", ".join(f"{name} in {percent(value)}" for _, _, value, name, _ in judged)
+    episodes = rows["episode_uuid"].nunique()
     text = (
-        f"{method} with {share:.4g} of {count} situations, {settings.redraws} candidates each "
-        f"({each}); upper bound over episodes, level divided among the remedies; "
-        f"{shown[3]} {shown[2]:.3g} (shown, not judged: with one valid mode it stays valid, and "
-        "what it loses shows in motion, at Gate D)"
+        f"of {number(len(rows))} situations, with {settings.redraws} candidates in each, acts "
+        f"validly: {each}; upper bound of {method} over {number(episodes)} episodes, level divided "
+        f"among the remedies; {shown[3]} in {percent(shown[2])} (shown, not judged: with one valid "
+        "mode it stays valid, and what it loses shows in motion, at Gate D)"
     )
-    return _bounded(share, (lower, upper), text, episodes)
+    counted = f"{episodes} episodes"
+    recount = subset.counted(rows)
+    return Measured(upper, (lower, upper), text, counted=counted, recount=recount, point=share)
 
 
 def redrawn_validity(rows: pd.DataFrame, *, redraws: int) -> Array:
@@ -116,28 +134,56 @@ def redrawn_validity(rows: pd.DataFrame, *, redraws: int) -> Array:
     return chance
 
 
-def valid_share(
-    rows: pd.DataFrame, *, confidence: float
-) -> tuple[float, float, float, tuple[int, int]]:
+@dataclass(frozen=True)
+class ValidShare:
+    """Share of two-mode situations with valid samples only.
+
+    Attributes:
+        lower: Lower end of its interval over episodes.
+        upper: Upper end.
+        episodes: Of the situations.
+        recount: The situations, and those with valid samples only.
+    """
+
+    lower: float
+    upper: float
+    episodes: int
+    recount: Recount
+
+    @property
+    def share(self) -> float:
+        """The share itself."""
+        return (self.recount.part or 0.0) / self.recount.whole
+
+    @property
+    def said(self) -> str:
+        """The same with its counts."""
+        return share_of(self.recount.part or 0.0, self.recount.whole, "situations")
+
+
+def valid_share(table: str, rows: pd.DataFrame, of: Term, *, confidence: float) -> ValidShare:
     """Share of two-mode situations with valid samples only, its interval, and what it is of.
 
-    Returns:
-        Share, lower end, upper end, and the numbers of situations and of their episodes.
-
     Valid: every sample passes all six layers, none lies between modes, some mode is reached.
+
+    Args:
+        table: Path of the table.
+        rows: Its rows.
+        of: Which of them are asked about.
+        confidence: Coverage of the interval.
 
     Raises:
         MissingEvidenceError: No situation with two modes.
     """
-    rows = rows[numbers(rows, "modes_present") >= 2]
+    subset = Subset(table, (of, TWO_MODES))
+    rows = subset.of(rows)
     if len(rows) == 0:
         raise MissingEvidenceError("no situation with two modes was given to the policy")
-    passed = numbers(rows, "admissible") >= numbers(rows, "samples")
-    valid = passed & (numbers(rows, "modes_covered") >= 1)
-    share, lower, upper = share_interval(
-        valid, list(rows["episode_uuid"]), confidence=confidence, favourable=False
+    _, lower, upper = share_interval(
+        all_hold(VALID, rows), list(rows["episode_uuid"]), confidence=confidence, favourable=False
     )
-    return share, lower, upper, (len(rows), rows["episode_uuid"].nunique())
+    episodes = rows["episode_uuid"].nunique()
+    return ValidShare(lower, upper, episodes, subset.counted(rows, *VALID))
 
 
 @criterion(
@@ -164,12 +210,11 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     # A style that is shown decides; then the test that is furthest from rejecting.
     shown, upper, interval, worst = max(found, key=lambda item: item[:2])
     text = (
-        f"{method} drawn by {worst.convention}: its latent moves chunks by "
-        f"{1000.0 * worst.spread_m:.3g} mm, "
-        f"of which {100 * worst.condition_share:.3g} % (squared) differs between "
-        f"{worst.situations} situations; distance correlation with the observation "
-        f"{worst.distance_correlation:.3g}; p-value of this training, with the interval that "
-        f"{worst.permutations} permutations leave"
+        f"the latent of {method}, drawn by {worst.convention}, moves chunks by "
+        f"{length(worst.spread_m)}, of which {percent(worst.condition_share)} (squared) differs "
+        f"between {number(worst.situations)} situations; distance correlation with the observation "
+        f"{three(worst.distance_correlation)}; p-value of this training, with the interval that "
+        f"{number(worst.permutations)} permutations leave"
     )
     counted = f"{worst.situations} situations"
     if upper > level and not shown:
@@ -206,7 +251,7 @@ def factors_isolated(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper bound of the best valid share of a variant that changes no head and no horizon."""
-    frame = evidence.rows(f"{MEASURED_FACTORS}/modes.parquet", FactorModeRow)
+    frame = evidence.rows(FACTOR_MODES, FactorModeRow)
     names = [
         name
         for name, item in _variants(evidence).items()
@@ -216,22 +261,26 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         raise MissingEvidenceError("no variant changes the encoder, the history or the trunk")
     # As many chances to look valid as there are variants: the level is divided among them.
     confidence = 1.0 - (1.0 - settings.confidence) / len(names)
-    bounds = []
-    for name in names:
-        rows = frame[frame["variant"] == name]
-        share, lower, upper, (_, episodes) = valid_share(rows, confidence=confidence)
-        bounds.append((upper, lower, share, name, episodes))
-    upper, lower, share, name, episodes = max(bounds)
+    found = {
+        name: valid_share(FACTOR_MODES, frame, is_one("variant", name), confidence=confidence)
+        for name in names
+    }
+    name = max(found, key=lambda one: (found[one].upper, found[one].lower, found[one].share, one))
+    best = found[name]
     text = (
-        f"largest of {len(names)} variants ({', '.join(names)}), {name} with {share:.4g}; upper "
-        "bound over episodes, level divided among the variants; short training"
+        f"largest of {len(names)} variants ({', '.join(names)}): {name} acts validly in "
+        f"{best.said}; upper bound over {number(best.episodes)} episodes, level divided among the "
+        "variants; short training"
     )
-    return _bounded(share, (lower, upper), text, episodes)
-
-
-def _bounded(share: float, ends: tuple[float, float], text: str, episodes: int) -> Measured:
-    """An upper bound of a share over episodes."""
-    return Measured(ends[1], ends, text, counted=f"{episodes} episodes", point=share)
+    counted = f"{best.episodes} episodes"
+    return Measured(
+        best.upper,
+        (best.lower, best.upper),
+        text,
+        counted=counted,
+        recount=best.recount,
+        point=best.share,
+    )
 
 
 def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:
@@ -277,7 +326,7 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
     text = f"best of {len(deployed)} deployed conventions, by {name}"
     if drawn:
         text += "; drawn at random, as a generator: " + ", ".join(
-            f"{who} {value:.3g} ({admissible[who]:.0%} of samples admissible)"
+            f"{who} {percent(value)} ({percent(admissible[who])} of its samples admissible)"
             for value, who in sorted(drawn, reverse=True)
         )
     return Measured(best, caveat=text)

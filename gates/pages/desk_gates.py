@@ -15,7 +15,8 @@ from gates.pages.desk_card import Signing
 from gates.pages.desk_costs import share
 from gates.pages.figures import Listing, Picturable, Shown, Table, draw_all, in_order
 from gates.pages.plots_time import TEMPERATURES
-from gates.pages.rows import Rows, RowsFile
+from gates.pages.rows import Rows
+from gates.pages.rows_files import RowsFile
 from gates.report import GATES, NAMES, Gate, GateReport, parse_report, report_bytes, report_path
 from gates.reproducibility.latency_budget import LATENCY, MILLI, budget_of
 from gates.stress.rollouts import ROLLOUTS

@@ -6,7 +6,8 @@ The unit stands in the criterion's name, and its limit says whether it is a shar
 import re
 
 from gates.pages.guide import unit
-from gates.report import Answer
+from gates.report import Answer, Recount
+from gates.words import number, three
 
 RATES = (
     "_share",
@@ -34,14 +35,14 @@ def human(answer: Answer, value: float | None) -> str:
         return "not measured"
     suffix = unit(answer.id)
     if suffix in ("s", "m") and abs(value) < 1 and value != 0:
-        return f"{_three(1000 * value)} m{suffix}"
+        return f"{three(1000 * value)} m{suffix}"
     if suffix:
-        return f"{_three(value)} {suffix}"
+        return f"{three(value)} {suffix}"
     if "ratio" in answer.id:
-        return f"×{_three(value)}"
+        return f"×{three(value)}"
     if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
-        return f"{_three(100 * value)} %"
-    return _three(value) if value != int(value) else f"{int(value):,}"
+        return f"{three(100 * value)} %"
+    return three(value) if value != int(value) else f"{int(value):,}"
 
 
 def limit_said(answer: Answer) -> str:
@@ -76,13 +77,23 @@ def judged_at(answer: Answer) -> str:
     return "the better end" if answer.measured == better else "a point of its interval"
 
 
+def recounted(recount: Recount) -> str:
+    """How a number is counted again from its rows: filter, and what is counted or added up.
+
+    `perturbation = nominal: 50 rows, of them success = true in 48`.
+    """
+    where = " and ".join(recount.where) or "all rows"
+    if recount.of:
+        parts = " and ".join(recount.summed)
+        added = f"{parts} add{'' if len(recount.summed) > 1 else 's'} up to {number(recount.part or 0.0)}"
+        return f"{where}: {recount.of} adds up to {number(recount.whole)}, {added}"
+    rows = f"{where}: {number(recount.whole)} row{'' if recount.whole == 1 else 's'}"
+    if recount.part is None:
+        return rows
+    return f"{rows}, of them {' and '.join(recount.hits)} in {number(recount.part)}"
+
+
 def rests_on(counted: str) -> str:
     """What a number counts, for a reader: `none of 1,080 arrivals`."""
     text = re.sub(r"^0 of ", "none of ", counted)
     return re.sub(r"\d{4,}", lambda found: f"{int(found[0]):,}", text)
-
-
-def _three(value: float) -> str:
-    """Three digits that count, and no powers of ten where a person would write none."""
-    rounded = float(f"{value:.3g}")
-    return f"{rounded:,.0f}" if 1000 <= abs(rounded) < 1e9 else f"{value:.3g}"

@@ -53,7 +53,7 @@ from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
-from gates.pages.numbers import human, judged_at, limit_said, rests_on
+from gates.pages.numbers import human, judged_at, limit_said, recounted, rests_on
 from gates.pages.rows import CRITERIA, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
@@ -292,6 +292,7 @@ def _render(template: str, **values: Any) -> str:
         judged_at=judged_at,
         limit_said=limit_said,
         rests_on=rests_on,
+        recounted=recounted,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
         **values,
     )

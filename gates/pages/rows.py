@@ -2,23 +2,24 @@
 
 One file for each table or document that a criterion read; of a table with a column `method`, one
 for each method. They hold the judged bytes and nothing else: columns that hold lists are left out,
-a hash is its first digits, and a larger table is a sample that says so. `criteria.csv` names, for
-each criterion, what was measured and in which of these files its rows stand.
+a hash is its first digits, and a larger table is a sample that says so. Of a table that is sampled
+a second file has what criteria count in it, of all its rows: equal ones in one line, with how many
+they are. `criteria.csv` names, for each criterion, what was measured, in which of these files its
+rows stand, and how they are counted again.
 """
 
-import csv
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from types import SimpleNamespace
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from gates.pages.rows_files import RowsFile, lines_of, sampled, whole_or_counted
 from gates.report import Answer, GateReport, report_path
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.errors import GenpolicyError
@@ -26,10 +27,6 @@ from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_bytes_of, sha256_file
 from genpolicy.integrity.tables import table_of
 
-LARGEST_BYTES = 100_000
-"""Of one file: 300 rollouts with all their columns are half of it, and git keeps every version."""
-HASH = re.compile(r"[0-9a-f]{64}")
-SHOWN_HASH = 12
 UNPLAIN = re.compile(r"[^A-Za-z0-9_-]")
 DOCUMENT = pa.schema([("place", pa.string()), ("value", pa.string())])
 KEPT_TABLES = 48
@@ -44,46 +41,10 @@ MISSING = "missing, it is not built here"
 ALTERED = "what lies here has other bytes than were judged"
 OTHERS = "none of a candidate of this gate"
 UNREADABLE = "it cannot be read"
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""How a text begins that a spreadsheet would run."""
 HEAD = (
     "criterion", "candidate", "measured", "low", "high", "comparison", "limit", "verdict",
-    "counted", "rows",
+    "counted", "rows", "recount", "where", "part", "part_value", "whole", "whole_value",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class RowsFile:
-    """Rows of one table or document, or of one method in it.
-
-    Attributes:
-        path: Of the evidence.
-        method: Whose rows they are; empty where the table does not tell methods apart.
-        name: Of the file in its folder.
-        kept: Rows that it holds.
-        of: Rows that there are.
-        data: Its bytes.
-    """
-
-    path: str
-    method: str
-    name: str
-    kept: int
-    of: int
-    data: bytes = field(repr=False)
-
-    @property
-    def said(self) -> str:
-        """How many rows it holds, and of how many where it holds not all."""
-        if self.kept == self.of:
-            return f"{self.of:,} row{'' if self.of == 1 else 's'}"
-        return f"a sample of {self.kept:,} of {self.of:,} rows"
-
-    @property
-    def title(self) -> str:
-        """Its evidence without folder and ending, for a link."""
-        stem = PurePosixPath(self.path).stem.replace("_", " ")
-        return f"{stem} of {self.method}" if self.method else stem
 
 
 @dataclass(frozen=True)
@@ -102,7 +63,7 @@ class Rows:
 
     def of(self, path: str) -> list[RowsFile]:
         """Files of one table or document; none where it is not evidence that lies here."""
-        return [file for file in self.files if file.path == path]
+        return [file for file in self.files if file.path == path and not file.folded]
 
     def by_method(self, path: str) -> dict[str, RowsFile]:
         """Files of one table by the method whose rows they hold."""
@@ -114,6 +75,17 @@ class Rows:
         if answer.candidate is None:
             return found
         return [file for file in found if file.method in ("", answer.candidate)]
+
+    def recounted(self, answer: Answer) -> RowsFile | None:
+        """The file in which a number is counted again: whole, or folded; None where it is not."""
+        asked = answer.recount
+        if asked is None:
+            return None
+        own = [
+            file for file in self.files if file.path == asked.table and file.method == asked.method
+        ]
+        every = (file for file in own if file.folded or file.kept == file.of)
+        return next(every, None)
 
 
 def rows_folder(gate: str) -> str:
@@ -127,9 +99,14 @@ def rows_of(root: Path, report: GateReport) -> Rows:
     What is missing below `root`, or has other bytes than were judged, has no file and says so.
     """
     asked: dict[str, set[str | None]] = {}
+    counted: dict[str, dict[str, None]] = {}
     for answer in report.criteria:
         for path in answer.evidence:
             asked.setdefault(path, set()).add(answer.candidate)
+        if answer.recount is not None:
+            counted.setdefault(answer.recount.table, {}).update(
+                dict.fromkeys(answer.recount.columns)
+            )
     played = frozenset(path for path in report.materials if path.endswith(".mcap"))
     found: list[RowsFile] = []
     lacking: dict[str, str] = {}
@@ -138,7 +115,9 @@ def rows_of(root: Path, report: GateReport) -> Rows:
             # What is asked of the gate may compare all methods; of a candidate, its own is asked.
             compares = None in whose or path in COMPARED
             only = frozenset[str]() if compares else frozenset(filter(None, whose))
-            files = _files(root / path, path, report.materials.get(path, ""), played, only)
+            wanted = _Wanted(path, report.materials.get(path, ""), played, only,
+                             tuple(counted.get(path, ())))  # fmt: skip
+            files = _files(root / path, wanted)
             if isinstance(files, str):
                 lacking[path] = files
             else:
@@ -158,11 +137,23 @@ def printed_rows(rows: Rows, report: GateReport) -> dict[str, bytes]:
             str(answer.verdict),
             answer.counted,
             " ".join(file.name for file in rows.under(answer)),
+            *_recount(rows, answer),
         )
         for answer in report.criteria
     ]
     files = {file.name: file.data for file in rows.files}
-    return {CRITERIA: b"".join(_lines(HEAD, *lines)), **files}
+    return {CRITERIA: b"".join(lines_of(HEAD, *lines)), **files}
+
+
+def _recount(rows: Rows, answer: Answer) -> tuple[str, ...]:
+    """In which file, what holds of the rows, and what the part and the whole are made of."""
+    asked, file = answer.recount, rows.recounted(answer)
+    if asked is None or file is None:
+        return ("",) * 6
+    part = f"sum of {' + '.join(asked.summed)}" if asked.summed else "; ".join(asked.hits)
+    whole = f"sum of {asked.of}" if asked.of else "rows"
+    where = "; ".join(asked.where)
+    return file.name, where, part, _exact(asked.part), whole, _exact(asked.whole)
 
 
 def _exact(value: float | None) -> str:
@@ -170,44 +161,60 @@ def _exact(value: float | None) -> str:
     return "" if value is None else json.dumps(value)
 
 
-def _files(
-    file: Path, path: str, judged: str, played: frozenset[str], only: frozenset[str]
-) -> tuple[RowsFile, ...] | str:
+@dataclass(frozen=True)
+class _Wanted:
+    """What is wanted of one table or document.
+
+    Attributes:
+        path: Its path.
+        judged: SHA-256 of the bytes that were judged.
+        played: Journals that are evidence.
+        only: Whose rows; of all methods if empty.
+        counted: Columns by which criteria count its rows.
+    """
+
+    path: str
+    judged: str
+    played: frozenset[str]
+    only: frozenset[str]
+    counted: tuple[str, ...]
+
+
+def _files(file: Path, wanted: _Wanted) -> tuple[RowsFile, ...] | str:
     """Files of what lies there, of these methods or of all; or why there are none."""
     if not file.is_file():
         return MISSING
     try:
-        if sha256_file(file) != judged:
+        if sha256_file(file) != wanted.judged:
             return ALTERED
-        return _split(file, path, judged, played, only) or OTHERS
+        return _split(file, wanted) or OTHERS
     except GenpolicyError:
         return UNREADABLE
 
 
 @lru_cache(maxsize=KEPT_TABLES)
-def _split(
-    file: Path, path: str, judged: str, played: frozenset[str], only: frozenset[str]
-) -> tuple[RowsFile, ...]:
+def _split(file: Path, wanted: _Wanted) -> tuple[RowsFile, ...]:
     """Files of one table or document, of the bytes that were judged."""
+    path, only = wanted.path, wanted.only
     digest, data = sha256_bytes_of(file, keep=True)
-    if digest != judged:
+    if digest != wanted.judged:
         return ()
     base = str(PurePosixPath(path.removeprefix(ARTIFACTS)).with_suffix("")).replace("/", ".")
     if path.endswith(".json"):
         places = [*_places(parse_json(data, where=path))]
-        return (_sampled(path, "", f"{base}.csv", pa.Table.from_pylist(places, schema=DOCUMENT)),)
+        return (sampled(path, "", f"{base}.csv", pa.Table.from_pylist(places, schema=DOCUMENT)),)
     table = table_of(data, where=path)
     names = [field.name for field in table.schema if not pa.types.is_nested(field.type)]
     table = table.select(names)
     if path.startswith(f"{STRESS}/") and set(ROLLOUT) <= set(names):
-        table = table.append_column("rollout", [_rollouts(table, played)])
+        table = table.append_column("rollout", [_rollouts(table, wanted.played)])
     if "method" not in names:
-        return (_sampled(path, "", f"{base}.csv", table),)
-    found = []
+        return tuple(whole_or_counted(path, "", base, table, wanted.counted))
+    found: list[RowsFile] = []
     for method in sorted({str(value) for value in pc.unique(table.column("method")).to_pylist()}):
         if method in only or not only:
             own = table.filter(pc.equal(table.column("method"), method))
-            found.append(_sampled(path, method, f"{base}.{_plain(method)}.csv", own))
+            found += whole_or_counted(path, method, f"{base}.{_plain(method)}", own, wanted.counted)
     return tuple(found)
 
 
@@ -241,61 +248,3 @@ def _places(value: Any, place: str = "") -> Iterator[dict[str, str]]:
     else:
         text = value if isinstance(value, str) else json.dumps(value)
         yield {"place": place, "value": text}
-
-
-def _sampled(path: str, method: str, name: str, table: pa.Table) -> RowsFile:
-    """All rows with their numbers in the table, or as many as the bound allows.
-
-    Which ones is drawn by their numbers, so that no condition or candidate is favoured by the
-    order of the table, and the same rows are drawn again.
-    """
-    numbers: list[int] = list(range(table.num_rows))
-    most = LARGEST_BYTES // (2 * table.num_columns)  # a cell and its comma are two bytes or more
-    if len(numbers) > most:
-        numbers = sorted(numbers, key=_drawn)[:most]
-    taken = table.take(pa.array(numbers, pa.int64()))
-    cells = [[_cell(value) for value in column.to_pylist()] for column in taken.columns]
-    counted = [number + 1 for number in numbers]
-    head, *lines = _lines(["row", *table.column_names], *zip(counted, *cells, strict=True))
-    kept = dict(zip(numbers, lines, strict=True))
-    if sum(map(len, lines)) > LARGEST_BYTES - len(head):
-        kept = _within(kept, LARGEST_BYTES - len(head))
-    data = head + b"".join(kept[number] for number in sorted(kept))
-    return RowsFile(path, method, name, len(kept), table.num_rows, data)
-
-
-def _drawn(number: int) -> bytes:
-    """Place of a row in the draw."""
-    return sha256_bytes(str(number).encode()).encode()
-
-
-def _within(lines: Mapping[int, bytes], most: int) -> dict[int, bytes]:
-    """As many lines as fit, in the order in which they are drawn."""
-    found: dict[int, bytes] = {}
-    for number in sorted(lines, key=_drawn):
-        most -= len(lines[number])
-        if most < 0:
-            break
-        found[number] = lines[number]
-    return found
-
-
-def _cell(value: Any) -> str:
-    """A cell: nine digits of a number, the first ones of a hash, a text that no program runs."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return f"{value:.9g}"
-    text = str(value)
-    if HASH.fullmatch(text):
-        return text[:SHOWN_HASH]
-    return f"'{text}" if isinstance(value, str) and text.startswith(FORMULA) else text
-
-
-def _lines(*rows: Sequence[Any]) -> list[bytes]:
-    """Each row as its line of a CSV file."""
-    texts: list[str] = []
-    csv.writer(SimpleNamespace(write=texts.append), lineterminator="\n").writerows(rows)
-    return [text.encode() for text in texts]

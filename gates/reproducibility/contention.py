@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from gates.evidence import Array, MissingEvidenceError
+from gates.words import percent
 
 CONTENDED_SHARE = 0.05
 """Share of its time that an invocation waits for a processor where the machine is contended. A
@@ -105,7 +106,7 @@ def weigh(wall: Ends, without: Ends | None, *, share: float | None, limit: float
     plain = (wall.least, wall.most)
     if share is None or without is None:
         return Weighed(plain, "how long it waited for a processor is not known")
-    said = f"at most {share:.2g} of it waiting for a processor"
+    said = f"at most {percent(share)} of it waiting for a processor"
     if not share >= CONTENDED_SHARE:
         return Weighed(plain, said)
     said += f" and without that {without.point:.3g} ({without.least:.3g} to {without.most:.3g})"

@@ -25,6 +25,7 @@ from gates.reproducibility.settings import (
     MODES_EARLIER,
     ReproducibilitySettings,
 )
+from gates.words import percent, points
 from genpolicy.evidence.documents.given import MATCHED
 from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
@@ -76,8 +77,8 @@ def late_change_upper(
     upper, (point, low, high), (situations, episodes) = max(found)
     fall = last_quarter(evidence, GENERATORS, candidate, confidence=settings.confidence)
     text = (
-        f"valid samples {point:+.4g} ({low:.4g} to {high:.4g}) at {situations} situations over the "
-        f"last quarter; not judged: validation loss falls {_text(fall)}"
+        f"valid samples {points(point)} ({points(low)} to {points(high)}) at {situations} "
+        f"situations over the last quarter; not judged: validation loss falls {_text(fall)}"
     )
     ends = (max(low, -high, 0.0), upper)
     counted = f"{episodes} episodes"
@@ -109,7 +110,9 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
             foreign.append(method)
     upper, _, worst = max(found)
     each = "; ".join(f"{method} {_text(fall)}" for _, method, fall in found)
-    text = each + (f"; no training of its own: {', '.join(foreign)}" if foreign else "")
+    text = f"validation loss falls: {each}" + (
+        f"; no training of its own: {', '.join(foreign)}" if foreign else ""
+    )
     counted = f"{worst.episodes} episodes"
     return Measured(upper, worst.interval, text, counted=counted, point=worst.share)
 
@@ -179,6 +182,7 @@ def has_training(evidence: Evidence, method: str) -> bool:
 
 def _text(fall: Fall) -> str:
     return (
-        f"{fall.share:.4g} ({fall.interval[0]:.4g} to {fall.interval[1]:.4g}) over the last "
+        f"{percent(fall.share)} ({percent(fall.interval[0])} to {percent(fall.interval[1])}) over "
+        f"the last "
         f"quarter of {fall.updates} updates, {fall.episodes} held-out episodes"
     )

@@ -1,13 +1,22 @@
 """Modes at the chosen NFE: does every one get samples that may be executed, what lies outside?"""
 
+import math
+
 import numpy as np
 import pandas as pd
 
 from gates.bounds import share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
+from gates.recount import AtLeast, Subset, is_one
 from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
+from gates.words import number, percent, share_of
 from genpolicy.evidence.rows.need import ModeRow
+
+EVERY_MODE = AtLeast("modes_covered", "modes_present")
+"""Of a situation: each of its modes is reached by some sample."""
+OUTSIDE = ("between_modes", "far_from_modes")
+"""Columns that count samples in no mode."""
 
 
 @criterion(
@@ -21,26 +30,31 @@ def mode_coverage_lower(
 ) -> Measured:
     """Lower bound of the share of situations of which every mode gets admissible samples enough."""
     found = []
-    for _, rows in situations_of(evidence, candidate).groupby("seed"):
-        drawn, fewest = numbers(rows, "samples"), numbers(rows, "fewest_admissible")
-        hits = fewest >= settings.mode_minimum_share * drawn
+    hit = AtLeast("fewest_admissible", "samples", settings.mode_minimum_share)
+    for seed, rows in situations_of(evidence, candidate).groupby("seed"):
         # There is one situation per episode and phase: those of one episode are one draw.
-        _, lower, upper = share_interval(
-            hits, list(rows["episode_uuid"]), confidence=settings.confidence, favourable=True
+        share, lower, upper = share_interval(
+            hit.holds(rows),
+            list(rows["episode_uuid"]),
+            confidence=settings.confidence,
+            favourable=True,
         )
-        reached = float((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).mean())
-        found.append((lower, upper, hits, rows, reached))
-    lower, upper, hits, rows, reached = min(found, key=lambda seed: seed[0])
-    episodes = rows["episode_uuid"].nunique()
+        reached = int(EVERY_MODE.holds(rows).sum())
+        recount = _of_seed(seed).counted(rows, hit)
+        found.append((lower, upper, share, recount, rows["episode_uuid"].nunique(), reached))
+    lower, upper, share, recount, episodes, reached = min(found, key=lambda seed: seed[0])
     text = (
-        f"in {hits.sum()} of {len(rows)} two-mode situations every mode gets at least "
-        f"{settings.mode_minimum_share:g} of the samples, admissible; "
-        f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}; "
-        f"lower bound over {episodes} episodes"
+        f"in {share_of(recount.part or 0.0, recount.whole, 'two-mode situations')} every mode gets "
+        f"at least {percent(settings.mode_minimum_share)} of the samples, admissible; one sample, "
+        f"whether or not it may be executed, reaches every mode in "
+        f"{share_of(reached, recount.whole)}; lower bound over {number(episodes)} episodes"
     )
-    share = float(hits.mean())
     counted = f"{episodes} episodes"
-    return Measured(lower, (lower, upper), text, counted=counted, point=share)
+    return Measured(lower, (lower, upper), text, counted=counted, recount=recount, point=share)
+
+
+def _of_seed(seed: object) -> Subset:
+    return Subset(MODES, (is_one("seed", int(str(seed))),))
 
 
 @criterion(
@@ -54,7 +68,7 @@ def outside_modes_upper(
 ) -> Measured:
     """Upper bound of the share of samples between two modes, or far from all of them."""
     found = []
-    for _, rows in situations_of(evidence, candidate).groupby("seed"):
+    for seed, rows in situations_of(evidence, candidate).groupby("seed"):
         between, far = counts(rows, "between_modes"), counts(rows, "far_from_modes")
         share, lower, upper = share_interval(
             (between + far) / numbers(rows, "samples"),
@@ -62,15 +76,21 @@ def outside_modes_upper(
             confidence=settings.confidence,
             favourable=False,
         )
-        sizes = (len(rows), rows["episode_uuid"].nunique())
-        found.append((upper, lower, share, float(far.sum()), sizes))
-    upper, lower, share, far_away, (situations, episodes) = max(found)
-    text = (
-        f"share {share:.4g} over {situations} two-mode situations, {far_away:g} samples far from "
-        "every mode; upper bound over episodes"
+        recount = _of_seed(seed).summed(rows, OUTSIDE, "samples")
+        sizes = (float(far.sum()), len(rows), rows["episode_uuid"].nunique())
+        found.append((upper, lower, share, sizes, recount))
+    upper, lower, share, (far_away, situations, episodes), recount = max(
+        found, key=lambda seed: seed[:4]
     )
+    text = (
+        f"{share_of(recount.part or 0.0, recount.whole, 'samples')} in {number(situations)} "
+        f"two-mode situations, {number(far_away)} of them far from every mode; upper bound over "
+        f"{number(episodes)} episodes"
+    )
+    if not math.isclose(share, (recount.part or 0.0) / recount.whole, abs_tol=1e-9):
+        text += f"; of a mean situation {percent(share)}, which is what is bounded"
     counted = f"{episodes} episodes"
-    return Measured(upper, (lower, upper), text, counted=counted, point=share)
+    return Measured(upper, (lower, upper), text, counted=counted, recount=recount, point=share)
 
 
 def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> pd.DataFrame:

@@ -17,6 +17,7 @@ from gates.evidence import Array, Evidence
 from gates.stress.cost import latency_p95_s
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import StressSettings
+from gates.words import points
 from genpolicy.statistics.eprocess import paired_e_value
 
 PASSED_UNMATCHED = "also passed, unmatched and so not ranked"
@@ -104,8 +105,8 @@ def ranked(
     )
     text = (
         f"promote either of {', '.join(left)}, {IN_SHORT}{better}: no paired test "
-        f"tells them apart (at most "
-        f"{most.e_value:.3g} that {most.better} is better than {most.other} by {most.gain:.3g}; "
+        f"tells them apart (at most {most.e_value:.3g} that {most.better} is better than "
+        f"{most.other} by {points(most.gain)}; "
         f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
     )
     return Decision(text, promoted=for_the_card)

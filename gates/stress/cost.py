@@ -14,19 +14,24 @@ from gates.criterion import Measured, criterion
 from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from gates.floors import OLDEST_ACTION_S
+from gates.recount import AtLeast, Term, is_one
+from gates.report import Recount
 from gates.stress.rollouts import (
     CURVES,
     DRILL,
     FAULTS,
     INVOCATIONS,
     NOMINAL,
+    ROLLOUTS,
     STRESS,
     Interval,
     StressSettings,
     in_every_condition,
     rollouts,
     success_lower,
+    within,
 )
+from gates.words import duration, number, percent, three
 from genpolicy.evidence.documents.stress import DISTILLED
 from genpolicy.evidence.rows.stress import FaultRow, InvocationRow
 from genpolicy.statistics.clustered import ratio_interval
@@ -37,6 +42,10 @@ INVOKED = "invocations"
 """The column of rollouts that counts them."""
 TOO_OLD = "beyond the maximum action age"
 """Said of a first answer that comes when nothing of it may be executed any more."""
+WARM = AtLeast("invocation", 1)
+"""Of an invocation: not the first of its session."""
+STEPPED_IN = AtLeast("interventions", 1)
+STOPPED = is_one("outcome", *STOPS)
 
 
 @criterion(
@@ -61,7 +70,7 @@ def _faults(evidence: Evidence, candidate: str) -> str:
     if len(own) == 0:
         return ""
     kinds = own.assign(count=counts(own, "count")).groupby("fault", sort=True)["count"].sum()
-    told = ", ".join(f"{kind} {number:g}" for kind, number in kinds.items() if kind)
+    told = ", ".join(f"{kind} {count:g}" for kind, count in kinds.items() if kind)
     return f"of them because its process failed: {told or 'none'}"
 
 
@@ -92,9 +101,9 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     )
     if any(recorded.get(key, 0) != count for key, count in stated):
         raise MissingEvidenceError("rollouts state other numbers of invocations than are recorded")
-    cold = numbers(rows, "invocation") == 0
+    warm = WARM.holds(rows)
 
-    def measure(part: pd.DataFrame, condition: str) -> Interval:
+    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
         if len(part) == 0:
             raise MissingEvidenceError(f"no warm invocation in {condition}: no answer to be timed")
         point, ends = upper_quantile(
@@ -104,10 +113,12 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
             confidence=settings.confidence,
             rng=settings.draws("D", "latency", candidate, condition),
         )
-        return point, *ends
+        subset = within(INVOCATIONS, condition)
+        subset = replace(subset, terms=(*subset.terms, WARM))
+        return (point, *ends), subset.counted(part)
 
-    found = in_every_condition(rows[~cold], settings.perturbations, measure)
-    text = f"{found.caveat}; {_cold(float(latency[cold].max(initial=0.0)), settings.oldest_s)}"
+    found = in_every_condition(rows[warm], settings.perturbations, measure, duration)
+    text = f"{found.caveat}; {_cold(float(latency[~warm].max(initial=0.0)), settings.oldest_s)}"
     for condition in settings.perturbations:
         if said := _uninvoked(rolled, condition):
             text = f"{text}; {said}"
@@ -127,8 +138,8 @@ def _uninvoked(rows: pd.DataFrame, condition: str) -> str:
 
 def _cold(longest_s: float, oldest_s: float) -> str:
     """The first answer of a session, beside the oldest action that may be executed."""
-    text = f"cold at most {longest_s:.4g} s"
-    return text if longest_s <= oldest_s else f"{text}, {TOO_OLD} of {oldest_s:g} s"
+    text = f"cold at most {duration(longest_s)}"
+    return text if longest_s <= oldest_s else f"{text}, {TOO_OLD} of {duration(oldest_s)}"
 
 
 @criterion(
@@ -175,7 +186,7 @@ def _share_of(  # noqa: PLR0917
 ) -> Measured:
     """Upper bound of a share of ticks or invocations; the starts are the draws."""
 
-    def measure(rows: pd.DataFrame, condition: str) -> Interval:
+    def measure(rows: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
         hits, all_of = numbers(rows, part), numbers(rows, whole)
         if whole == INVOKED and np.any(all_of == 0):
             raise MissingEvidenceError(f"{_uninvoked(rows, condition)}: a share of none is unknown")
@@ -188,10 +199,11 @@ def _share_of(  # noqa: PLR0917
             confidence=settings.confidence,
             rng=settings.draws("D", part, candidate, condition),
         )
-        return float(hits.sum() / all_of.sum()), *ends
+        recount = within(ROLLOUTS, condition).summed(rows, (part,), whole)
+        return (float(hits.sum() / all_of.sum()), *ends), recount
 
     rows = rollouts(evidence, settings, candidate)
-    return in_every_condition(rows, conditions or settings.perturbations, measure)
+    return in_every_condition(rows, conditions or settings.perturbations, measure, percent)
 
 
 @criterion(
@@ -206,7 +218,8 @@ def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: 
     Where people had the arm, their time for each success of the policy is said beside it.
     """
     rows = rollouts(evidence, settings, candidate)
-    found = _rollouts_with(rows.assign(hit=counts(rows, "interventions") > 0), settings)
+    counts(rows, "interventions")  # refused where one is below none
+    found = _rollouts_with(rows, STEPPED_IN, settings)
     said = _persons_time(rows)
     return replace(found, caveat=f"{found.caveat}; {said}") if said else found
 
@@ -219,8 +232,9 @@ def _persons_time(rows: pd.DataFrame) -> str:
     if had_s == 0:
         return ""
     if successes == 0:
-        return f"people had the arm for {had_s:.4g} s, and nothing succeeded"
-    return f"people had the arm for {had_s / successes:.3g} s for each of {successes} successes"
+        return f"people had the arm for {three(had_s)} s, and nothing succeeded"
+    each = three(had_s / successes)
+    return f"people had the arm for {each} s for each of {number(successes)} successes"
 
 
 @criterion(
@@ -234,21 +248,22 @@ def reset_upper(evidence: Evidence, settings: StressSettings, candidate: str) ->
     rows = rollouts(evidence, settings, candidate)
     if rows["outcome"].eq("").any():
         raise MissingEvidenceError("a rollout has no outcome")
-    return _rollouts_with(rows.assign(hit=rows["outcome"].isin(STOPS)), settings)
+    return _rollouts_with(rows, STOPPED, settings)
 
 
-def _rollouts_with(rows: pd.DataFrame, settings: StressSettings) -> Measured:
+def _rollouts_with(rows: pd.DataFrame, hit: Term, settings: StressSettings) -> Measured:
     """Exact upper bound of the share of rollouts that were hit, in every condition."""
-    return in_every_condition(
-        rows,
-        settings.perturbations,
-        lambda part, _: share_interval(
-            part["hit"].to_numpy(),
+
+    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
+        interval = share_interval(
+            hit.holds(part),
             part["start"].to_numpy(),
             confidence=settings.confidence,
             favourable=False,
-        ),
-    )
+        )
+        return interval, within(ROLLOUTS, condition).counted(part, hit)
+
+    return in_every_condition(rows, settings.perturbations, measure, percent)
 
 
 @criterion(
@@ -272,10 +287,10 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
     if touched < fewest:
         raise MissingEvidenceError(
             f"hardly exercised: contact on {touched} of {rows['start'].nunique()} starts, in any "
-            f"condition; {fewest} are needed to bound a 95% quantile"
+            f"condition; {fewest} are needed to bound what 95 % keep"
         )
 
-    def measure(part: pd.DataFrame, condition: str) -> Interval:
+    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
         point, ends = upper_quantile(
             numbers(part, "force_peak_n"),
             part["start"].to_numpy(),
@@ -283,11 +298,15 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
             confidence=settings.confidence,
             rng=settings.draws("D", "force", candidate, condition),
         )
-        return point, *ends
+        return (point, *ends), within(ROLLOUTS, condition).counted(part)
 
-    found = in_every_condition(rows, settings.perturbations, measure)
-    text = f"{found.caveat}; contact on {touched} starts, largest {forces.max():.4g} N"
+    found = in_every_condition(rows, settings.perturbations, measure, _newtons)
+    text = f"{found.caveat}; contact on {touched} starts, largest {_newtons(forces.max())}"
     return replace(found, caveat=text)
+
+
+def _newtons(force_n: float) -> str:
+    return f"{three(force_n)} N"
 
 
 @criterion(

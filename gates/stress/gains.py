@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from gates.evidence import Array, Evidence
 from gates.stress.pairs import paired_by_condition
 from gates.stress.rollouts import ENVELOPE, StressSettings
+from gates.words import points
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
 
 WORST = "worst in"
@@ -54,8 +55,8 @@ class Inside:
     def __str__(self) -> str:
         low, high = self.interval
         return (
-            f"inside the envelope {self.gain:+.4g} over {self.baseline} on {self.starts} starts, "
-            f"between {low:+.3g} and {high:+.3g}"
+            f"inside the envelope {points(self.gain)} over {self.baseline} on {self.starts} "
+            f"starts, between {points(low)} and {points(high)}"
         )
 
 
@@ -93,7 +94,7 @@ def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -
             gain = (round(float(found.mean()), 12) + 0.0, baseline)
             least[condition] = min(least.get(condition, gain), gain)
     told = ", ".join(
-        f"{condition} {gain:+.4g} over {baseline}"
+        f"{condition} {points(gain)} over {baseline}"
         for (gain, baseline), condition in sorted((gain, name) for name, gain in least.items())
     )
     return f"on {settings.planned_starts} starts in each condition, {WORST} {told}"

@@ -22,6 +22,7 @@ from gates.stress.gains import by_condition, inside_envelope, least_gain
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
+from gates.words import points
 
 
 @criterion(
@@ -46,8 +47,8 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     inside = inside_envelope(evidence, settings, candidate)
     least = least_gain(differences, inside, settings)
     text = (
-        f"lowest over baselines, against {least.baseline}: mean gain {least.gain:.4g} over "
-        f"{settings.planned_starts} starts, margin {settings.margin:g}; "
+        f"lowest over baselines, against {least.baseline}: mean gain {points(least.gain)} over "
+        f"{settings.planned_starts} starts, margin {points(settings.margin)}; "
         f"{by_condition(evidence, settings, candidate)}"
     )
     text = f"{text}; {inside or 'no condition inside the envelope of a card was planned'}"

@@ -18,6 +18,7 @@ from gates.bounds import wide_interval
 from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import StressSettings
+from gates.words import percent
 from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorThresholdRow
 from genpolicy.monitors.names import CONTROLS, TIME, VARIANCE
@@ -205,9 +206,10 @@ def _sentence(found: Candidate) -> str:
         else f"no monitor is shown to cover more than {controls}"
     )
     return (
-        f"of {best.failures} failures under probes, {best.monitor} had an alarm before a share of "
-        f"{best.coverage[0]:.2g} ({best.coverage[1]:.2g} to {best.coverage[2]:.2g}), more than any "
-        f"other monitor or as many, and the clock before {clock.coverage[0]:.2g}; {shown}"
+        f"of {best.failures} failures under probes, {best.monitor} had an alarm before "
+        f"{percent(best.coverage[0])} ({percent(best.coverage[1])} to {percent(best.coverage[2])}),"
+        f" more than any other monitor or as many, and the clock before "
+        f"{percent(clock.coverage[0])}; {shown}"
     )
 
 

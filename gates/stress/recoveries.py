@@ -11,6 +11,7 @@ import pandas as pd
 
 from gates.bounds import share_interval
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
+from gates.recount import is_one
 from gates.stress.rollouts import DRILL, STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import RecoveryRow
 from genpolicy.statistics.eprocess import gain_interval
@@ -20,6 +21,8 @@ PUSH = "push"
 PERTURBED = (DRILL, PUSH)
 """Conditions that put the arm where the policy did not mean to be, on every start."""
 ROLLOUT = ["seed", "perturbation", "start"]
+RECOVERED = is_one("recovered", True)
+"""Of an entry into recovery."""
 
 
 def recoveries(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:

@@ -10,8 +10,10 @@ from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.report import Owner
+from gates.recount import Subset, is_one
+from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
+from gates.words import percent, share_of
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
@@ -33,6 +35,8 @@ ENVELOPE = "envelope"
 
 Interval = tuple[float, float, float]
 """Share or quantile, lower and upper end."""
+SUCCEEDED = is_one("success", True)
+"""Of a rollout."""
 
 
 class StressSettings(CandidateSettings):
@@ -164,8 +168,16 @@ def _require_as_it_ended(rows: pd.DataFrame, method: str) -> None:
         )
 
 
+def within(table: str, condition: str) -> Subset:
+    """Rows of one condition."""
+    return Subset(table, (is_one("perturbation", condition),))
+
+
 def in_every_condition(
-    rows: pd.DataFrame, conditions: Sequence[str], measure: Callable[[pd.DataFrame, str], Interval]
+    rows: pd.DataFrame,
+    conditions: Sequence[str],
+    measure: Callable[[pd.DataFrame, str], tuple[Interval, Recount]],
+    said: Callable[[float], str],
 ) -> Measured:
     """An upper bound that must hold in each of some conditions: that of the worst one.
 
@@ -175,19 +187,28 @@ def in_every_condition(
     Args:
         rows: Rollouts, or invocations, of one method.
         conditions: Where it must hold.
-        measure: Point and ends of the interval in one condition, from its rows and its name.
+        measure: Point and ends of the interval in one condition, from its rows and its name, and
+            what they are counted from.
+        said: Such a number as a reader reads it.
     """
     found = []
     for condition in conditions:
         part = rows[rows["perturbation"] == condition]
-        point, lower, upper = measure(part, condition)
-        found.append((upper, lower, point, condition, part["start"].nunique()))
-    upper, lower, point, condition, starts = max(found)
-    others = ", ".join(f"{name} {end:.4g}" for end, _, _, name, _ in found if name != condition)
-    text = f"worst in {condition}: {point:.4g}, bounded by {upper:.4g}"
-    text += f"; {others}" if others else ""
+        (point, lower, upper), recount = measure(part, condition)
+        found.append((upper, lower, point, condition, part["start"].nunique(), recount))
+    upper, lower, point, condition, starts, recount = max(found, key=lambda one: one[:4])
+    others = ", ".join(f"{one[3]} {said(one[0])}" for one in found if one[3] != condition)
+    text = f"worst in {condition}: {_counted(point, recount, said)}, at most {said(upper)}"
+    text += f"; at most in the others: {others}" if others else ""
     counted = f"{starts} starts"
-    return Measured(upper, (lower, upper), text, counted=counted, point=point)
+    return Measured(upper, (lower, upper), text, counted=counted, recount=recount, point=point)
+
+
+def _counted(point: float, recount: Recount, said: Callable[[float], str]) -> str:
+    if recount.part is None:
+        return said(point)
+    units = recount.of.replace("_", " ") or "rollouts"
+    return share_of(recount.part, recount.whole, units)
 
 
 def success_lower(
@@ -201,15 +222,25 @@ def success_lower(
     rows = rollouts(evidence, settings, candidate)
     found = []
     for condition in conditions:
-        part = rows[rows["perturbation"] == condition]
-        share, lower, upper = share_interval(
-            flags(part, "success"),
+        subset = within(ROLLOUTS, condition)
+        part = subset.of(rows)
+        _, lower, upper = share_interval(
+            SUCCEEDED.holds(part),
             part["start"].to_numpy(),
             confidence=settings.confidence,
             favourable=True,
         )
-        found.append((lower, upper, share, condition, part["start"].nunique()))
-    lower, upper, share, condition, starts = min(found)
-    text = f"{condition}: share {share:.4g}, lower bound over {starts} starts"
+        recount = subset.counted(part, SUCCEEDED)
+        found.append((lower, upper, condition, part["start"].nunique(), recount))
+    lower, upper, condition, starts, recount = min(found, key=lambda one: one[:3])
+    share = share_of(recount.part or 0.0, recount.whole, "rollouts")
+    text = f"{condition}: {share} succeed; at least {percent(lower)}, by {starts} starts"
     counted = f"{starts} starts"
-    return Measured(lower, (lower, upper), text, counted=counted, point=share)
+    return Measured(
+        lower,
+        (lower, upper),
+        text,
+        counted=counted,
+        recount=recount,
+        point=(recount.part or 0.0) / recount.whole,
+    )

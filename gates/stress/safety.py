@@ -5,12 +5,16 @@ import numpy as np
 from gates.again import changed_since_gate_b
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, counts, flags
+from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.arrivals import at_the_stub, require_played
 from gates.feasibility.proof import checked_violations
-from gates.stress.recoveries import recoveries
-from gates.stress.rollouts import JOURNALS, STRESS, StressSettings
+from gates.recount import Subset
+from gates.stress.recoveries import RECOVERED, RECOVERIES, recoveries
+from gates.stress.rollouts import JOURNALS, STRESS, StressSettings, within
+from gates.words import percent, share_of
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
+
+STUB = f"{STRESS}/stub.parquet"
 
 
 @criterion(
@@ -40,19 +44,19 @@ def recovery_success_lower(
         starts = part["start"].nunique()
         reach, _ = counted_interval(starts, starts, confidence=settings.confidence)
         enough = reach >= least
-        share, lower, upper = share_interval(
-            flags(part, "recovered"),
+        _, lower, upper = share_interval(
+            RECOVERED.holds(part),
             part["start"].to_numpy(),
             confidence=settings.confidence,
             favourable=enough,  # the count of what is judged at its better end is rounded up
         )
         bound, end = (lower, "at worst") if enough else (upper, "at best")
-        text = (
-            f"worst in {condition}: {share:.4g} of {len(part)} recoveries on {starts} starts, "
-            f"{end} {bound:.4g}"
-        )
+        recount = within(RECOVERIES, str(condition)).counted(part, RECOVERED)
+        share = share_of(recount.part or 0.0, recount.whole, "recoveries")
+        text = f"worst in {condition}: {share} on {starts} starts, {end} {percent(bound)}"
         if enough or bound < least:
-            said = Measured(bound, (lower, upper), text, counted=f"{starts} starts")
+            counted = f"{starts} starts"
+            said = Measured(bound, (lower, upper), text, counted=counted, recount=recount)
             found.append((bound, said))
     if not found:
         most = rows.groupby("perturbation")["start"].nunique().max()
@@ -84,11 +88,12 @@ def changed_answers(evidence: Evidence, settings: StressSettings, candidate: str
 )
 def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Stale or invalid actions that arrived at the controller stub."""
-    rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
+    rows = evidence.of(STUB, StressStubRow, candidate)
     require_played(rows, "perturbation", settings.perturbations)
     bad, arrivals = at_the_stub(rows, "stale", "invalid")
     counted = f"{bad:g} of {arrivals:g} arrivals"
-    return Measured(bad, caveat="stale or invalid", counted=counted)
+    recount = Subset(STUB).summed(rows, ("stale", "invalid"), "arrivals")
+    return Measured(bad, caveat="stale or invalid", counted=counted, recount=recount)
 
 
 @criterion(

@@ -6,6 +6,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
 from gates.verdicts import rounded
+from gates.words import percent
 from genpolicy.evidence.documents.stress import POWER, Power
 
 
@@ -92,8 +93,9 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     back = min(row.return_share for row in without.values())
     baseline, candidate = settings.planned_effect
     text = (
-        f"success {baseline:g} against {candidate:g} is promoted in {promote:.3g} of simulated "
-        f"trials; a gain of at most the margin is returned in {back:.3g}"
+        f"success of {percent(candidate)} against {percent(baseline)} is promoted in "
+        f"{percent(promote)} of simulated trials; a gain of at most the margin is returned in "
+        f"{percent(back)}"
     )
     limit = settings.limits.of.get("verdict_reachable")
     asked = limit.limit if limit and limit.limit is not None else 0.0
