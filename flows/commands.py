@@ -48,15 +48,21 @@ def ladder(workspace: Workspace = Path()) -> int:
 
 
 @with_examples("genpolicy resume")
-def resume(workspace: Workspace = Path()) -> int:
+def resume(
+    workspace: Workspace = Path(),
+    if_waiting: Annotated[
+        bool, typer.Option("--if-waiting", help="Exit 0 where no run waits, or no server answers.")
+    ] = False,
+) -> int:
     """Go on with gate E, suspended by `genpolicy ladder`.
 
     The signed card is verified first: a wrong one is told with its reason, and
     leaves the run suspended (exit 3). The run then judges it again by itself.
+    The last signature of `genpolicy card sign` does the same.
     """
     from flows.resume import resume_gate
 
-    return resume_gate(workspace)
+    return resume_gate(workspace, if_waiting=if_waiting)
 
 
 @with_examples("genpolicy serve --cron '0 3 * * *'")

@@ -16,18 +16,25 @@ from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError
 
 
-def resume_gate(workspace: Path) -> int:
+def resume_gate(workspace: Path, *, if_waiting: bool = False) -> int:
     """Resume the run that waits, unless its card is wrong; returns the exit code.
 
     A card that is wrong, or not there, is told with its reason and leaves the run suspended.
+
+    Args:
+        workspace: Whose run it is.
+        if_waiting: Whether it is no fault if none waits, or nobody can be asked.
 
     Raises:
         BadInputError: No run waits for this workspace.
     """
     if not server_is_there():
-        return EXIT_FAULT
+        return EXIT_DONE if if_waiting else EXIT_FAULT
     with get_client(sync_client=True) as client:
         runs = waiting(client, str(workspace.resolve()))
+        if not runs and if_waiting:
+            print(f"No run of gate E waits in {database()}.")
+            return EXIT_DONE
         if not runs:
             raise BadInputError(
                 where=str(workspace),

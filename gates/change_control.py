@@ -6,17 +6,18 @@ back shows twice. It came after the evidence unless it lies before every commit 
 hash of that evidence into `dvc.lock`: the order of commits is known, the hour of a run is not.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from gates.card.history import MEASURED, brought_by, commits_of, evidence_digests, unknown_history
+from gates.floor_history import FLOORS, bound_moves
 from gates.git import git
 from gates.overrides import placed, read_overrides
 from gates.pipeline import LOCK
-from gates.preregistration import Move, asked_by, moves, plan_of
+from gates.preregistration import asked_by, moves, plan_of
 from gates.report import GATES, Gate
 from gates.settings import PARAMS_FILE, read_params
 from genpolicy.errors import GenpolicyError
@@ -33,7 +34,7 @@ class Shifted:
 
     Attributes:
         gate: The lowest gate that judges by it.
-        place: In `params.yaml`, a limit by its gate and criterion.
+        place: In `params.yaml`, a limit by its gate and criterion; a bound behind its file.
         kind: `loosened`, `tightened`, or `changed` where neither side is stricter.
         before: What stood there.
         now: What the commit put there.
@@ -60,7 +61,8 @@ class Control:
 
     Attributes:
         unknown: Why it says nothing; empty where it does.
-        shifted: Limits that moved after their evidence was there, the newest first.
+        shifted: Limits that moved after their evidence was there, the newest first; behind them
+            bounds of limits.
         undated: Evidence stages whose evidence is in no commit, so that nobody knows what of the
             committed limits is older.
         overrides: Each written exception, and who committed it.
@@ -70,6 +72,10 @@ class Control:
     shifted: tuple[Shifted, ...]
     undated: tuple[str, ...]
     overrides: tuple[str, ...]
+
+
+_Moved = tuple[Gate, str, str, str]
+"""The lowest gate that judges by a place, how it moved, from what and to what."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +107,13 @@ def control_of(root: Path) -> Control:
         if commits
     }
     shifted: list[Shifted] = []
-    for commit in _commits(root):
-        there = [stage for stage in dated if commit.sha not in older.get(stage, {commit.sha})]
-        if not commit.sha:
-            there = list(dated)
-        if there:
-            shifted += _shifted(root, commit, params, there)
+    for path, moved in ((PARAMS_FILE, _limits_moved), (FLOORS, _bounds_moved)):
+        for commit in _commits(root, path):
+            there = [stage for stage in dated if commit.sha not in older.get(stage, {commit.sha})]
+            if not commit.sha:
+                there = list(dated)
+            if there:
+                shifted += _shifted(root, commit, path, moved, there)
     undated = tuple(stage for stage, commits in dated.items() if not commits)
     return Control("", tuple(shifted), undated, tuple(_exceptions(root, params)))
 
@@ -157,41 +164,60 @@ def _exceptions(root: Path, params: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _commits(root: Path) -> Iterator[_Commit]:
-    """What is not committed, then the commits that changed the limits, the newest first."""
+def _commits(root: Path, path: str) -> Iterator[_Commit]:
+    """What is not committed, then the commits that changed a file, the newest first."""
     head = git(root, "rev-parse", "HEAD") or ""
-    if git(root, "diff", "--quiet", "HEAD", "--", PARAMS_FILE) is None:
+    if git(root, "diff", "--quiet", "HEAD", "--", path) is None:
         yield _Commit("", (head,), "", "")
-    listed = git(root, "log", "--full-history", f"--format={FIELDS}", "--", PARAMS_FILE) or ""
+    listed = git(root, "log", "--full-history", f"--format={FIELDS}", "--", path) or ""
     for line in listed.splitlines():
         sha, parents, by, day = line.split("\0")
         yield _Commit(sha, tuple(parents.split()), by, day)
 
 
 def _shifted(
-    root: Path, commit: _Commit, params: Mapping[str, Any], there: list[str]
+    root: Path,
+    commit: _Commit,
+    path: str,
+    moved: Callable[[str, str], dict[str, _Moved]],
+    there: list[str],
 ) -> Iterator[Shifted]:
     """What a commit moved that the evidence is judged by: other than with each of its parents."""
-    now = _params_at(root, commit.sha) if commit.sha else params
-    each = [_moved(_params_at(root, parent), now) for parent in commit.parents]
-    for place, move in each[0].items() if each else ():
-        gate = asked_by(place)
+    now = _text_at(root, commit.sha, path)
+    each = [moved(_text_at(root, parent, path), now) for parent in commit.parents]
+    for place, (gate, kind, before, value) in each[0].items() if each else ():
         reached = GATES[GATES.index(gate) :]
         after = tuple(stage for stage in there if MEASURED[stage] in reached)
         if after and all(place in other for other in each):
             yield Shifted(
-                gate, place, move.kind, str(move.before), str(move.now),
-                commit.sha, commit.day, commit.by, after,
-            )  # fmt: skip
+                gate, place, kind, before, value, commit.sha, commit.day, commit.by, after
+            )
 
 
-def _moved(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Move]:
-    return {move.place: move for move in moves(plan_of(before), now)}
+def _limits_moved(before: str, now: str) -> dict[str, _Moved]:
+    """Limits and other settings of the plan that differ between two texts of the parameters."""
+    found = moves(plan_of(_params_in(before)), _params_in(now))
+    return {
+        move.place: (asked_by(move.place), move.kind, str(move.before), str(move.now))
+        for move in found
+    }
 
 
-def _params_at(root: Path, commit: str) -> Mapping[str, Any]:
-    """Settings as a commit left them; none where it had none that can be read."""
-    text = git(root, "show", f"{commit}:./{PARAMS_FILE}") or ""
+def _bounds_moved(before: str, now: str) -> dict[str, _Moved]:
+    """Bounds of limits that differ between two texts of the module that holds them."""
+    return dict(bound_moves(before, now))
+
+
+def _text_at(root: Path, commit: str, path: str) -> str:
+    """A file as a commit left it, or as it lies here; empty where it had none."""
+    if commit:
+        return git(root, "show", f"{commit}:./{path}") or ""
+    file = root / path
+    return file.read_text() if file.is_file() else ""
+
+
+def _params_in(text: str) -> Mapping[str, Any]:
+    """Settings; none where the text has none that can be read."""
     try:
         found = parse_yaml(text.encode(), where=PARAMS_FILE)
     except GenpolicyError:

@@ -214,29 +214,6 @@ def preregister(root: Root = Path()) -> int:
     return 0
 
 
-def sign_card(
-    card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
-    key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
-    reviewer: Annotated[str, typer.Option(help="Your id on reviewers.yaml.")],
-    root: Root = Path(),
-) -> int:
-    """Add your signature to a trial card.
-
-    Before, gates A to D are proved again, the plan must have been committed
-    before the evidence, nobody but the authors may have committed to the
-    candidate, evidence must be what its journals say (minutes), pages what reports say.
-    """
-    from gates.card import signing
-    from gates.overriders import require_in_force
-    from gates.proof import prove_chain
-
-    require_in_force(root, prove_chain(root, "D")[0])
-    _require_beneath(root)
-    path = signing.sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
-    print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
-    return 0
-
-
 def verify_card(
     root: Root = Path(),
     today: Annotated[str, typer.Option(help="Day to judge for, YYYY-MM-DD; default today.")] = "",
@@ -250,7 +227,7 @@ def verify_card(
 
     report = judge(root, "E", today=_day(today) if today else None)
     if report.verdict == "PASS":
-        _require_beneath(root)
+        require_beneath(root)
     if as_json:
         print(report.model_dump_json(indent=2))
     else:
@@ -319,7 +296,7 @@ retired(gates, "verify-card", "card verify")
 retired(verify, "card", "card verify")
 
 
-def _require_beneath(root: Path) -> None:
+def require_beneath(root: Path) -> None:
     """What a proved chain does not show: its history, and that its journals say the same."""
     from gates.card.history import require_history
     from gates.rederive import rederive

@@ -227,6 +227,12 @@ def exceptions_of(root: Path, params: Mapping[str, Any], gate: Gate) -> Exceptio
         return Exceptions(own)
 
 
+def apart(decision: str) -> tuple[str, str]:
+    """A decision without what is overridden, and that: empty where nothing is."""
+    text, sign, rest = decision.partition(f"{OVERRIDDEN}:")
+    return text.strip(), f"{sign}{rest}"
+
+
 def is_said(caveat: str) -> bool:
     """Whether a caveat speaks of an exception, as `said` does."""
     return caveat.startswith(f"{OVERRIDDEN} ")

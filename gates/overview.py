@@ -12,6 +12,7 @@ from pathlib import Path
 
 import typer
 
+from gates.overrides import apart
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
 from gates.report import limit_text, measured_text, read_report, stage_of
@@ -42,6 +43,7 @@ class Line:
         seconds: Wall time of its last run, s.
         peak_mib: Largest memory of one of its processes, MiB.
         stopped: Candidates that fail at a gate, each with its first criterion, number and limit.
+        overridden: Criteria that the verdict holds to another limit, and what it is without.
     """
 
     stage: str
@@ -50,6 +52,7 @@ class Line:
     seconds: float | None
     peak_mib: int | None
     stopped: tuple[str, ...] = ()
+    overridden: str = ""
 
 
 def overview(root: Path, rungs: list[Rung]) -> list[Line]:
@@ -72,9 +75,10 @@ def overview(root: Path, rungs: list[Rung]) -> list[Line]:
         if rung is None:
             lines.append(Line(stage, ended, "", seconds, peak))
         else:
-            decided = rung.decided_by or rung.note
+            decision, overridden = apart(rung.note)
+            decided = rung.decided_by or decision
             fell = tuple(_stopped(root, rung))
-            lines.append(Line(stage, rung.verdict, decided, seconds, peak, fell))
+            lines.append(Line(stage, rung.verdict, decided, seconds, peak, fell, overridden))
     return lines
 
 
@@ -96,7 +100,7 @@ def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) 
         lines: Of the table.
         terminal: Whether a person reads it at once; otherwise each stage has one line, however
             long, for programs that take lines apart.
-        colour: Whether verdicts are coloured.
+        colour: Whether verdicts are coloured, and what is overridden is red.
     """
     wide = max([len("stage"), *(len(line.stage) for line in lines)])
     head = f"{'stage':<{wide}} {'verdict':<15} {'time':>8} {'memory':>8}"
@@ -111,11 +115,18 @@ def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) 
         said = [said for said in (line.decided_by, *line.stopped) if said]
         if terminal:
             rows += [text.rstrip(), *(row for one in said for row in _below(one))]
+            rows += [red(row, colour=colour) for row in _below(line.overridden)]
         else:
+            said += [red(line.overridden, colour=colour)] if line.overridden else []
             rows.append(f"{text}  {'; '.join(said)}".rstrip())
     total = sum(line.seconds for line in lines if line.seconds is not None)
     rows.append(f"{'':<{wide}} {'':<15} {total:>6.1f} s")
     return "\n".join(rows)
+
+
+def red(text: str, *, colour: bool) -> str:
+    """A text in red, where there is colour."""
+    return typer.style(text, fg="red") if colour else text
 
 
 def _below(text: str) -> list[str]:

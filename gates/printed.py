@@ -12,9 +12,10 @@ from gates.card.history import require_said_by_themselves, unknown_history
 from gates.card.people import load_allow_list
 from gates.for_ci import as_github, as_junit, beside, cases
 from gates.overriders import require_in_force
-from gates.overrides import OVERRIDES
+from gates.overrides import OVERRIDES, apart
+from gates.overview import red
 from gates.proof import Rung
-from gates.report import Gate, read_report
+from gates.report import GATES, Gate, read_report, report_path, stage_of
 from gates.writing import INDEX, changed_page
 from genpolicy.errors import GenpolicyError
 
@@ -97,9 +98,17 @@ def page_problem(root: Path) -> Problem | None:
         return None
     text = (
         f"{page} is another page, expected the one that the reports give. Run "
-        "`dvc repro -f gate_a`, which prints it again; never edit a page."
+        f"`{_printing(page)}`, which prints it again; never edit a page."
     )
     return "page", text, page, 3
+
+
+def _printing(page: str) -> str:
+    """The command that prints a page again: of a gate its stage, of the first page any of them."""
+    for gate in GATES:
+        if page.startswith(report_path(gate).removesuffix(".json")):
+            return f"dvc repro -f {stage_of(gate)}"
+    return "python -m gates.writing"
 
 
 def print_cases(
@@ -125,7 +134,10 @@ def print_rungs(rungs: Sequence[Rung], as_json: bool) -> None:
     wide = max(len(rung.name) for rung in rungs)
     for rung in rungs:
         name = f"{rung.gate}  {rung.name:<{wide}}  {rung.verdict:<14}"
-        print(f"{name}  {rung.decided_by or rung.note}".rstrip())
+        decision, overridden = apart(rung.note)
+        said = [rung.decided_by or decision]
+        said += [red(overridden, colour=coloured())] if overridden else []
+        print(f"{name}  {' '.join(said)}".rstrip())
 
 
 def print_rows(rows: Sequence[Any]) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gates.commands import Root, sign_card, verify_card
+from gates.commands import Root, require_beneath, verify_card
 from genpolicy.cli.shell import examples, new_app
 
 if TYPE_CHECKING:
@@ -14,8 +14,34 @@ if TYPE_CHECKING:
 
 SIGN = "card sign --card completed.json --key my_key.pem --reviewer my-id"
 card = new_app("Make a key, fill a card, sign it, verify it.")
-card.command("sign", epilog=examples(f"genpolicy {SIGN}"))(sign_card)
 card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
+
+
+@card.command(epilog=examples(f"genpolicy {SIGN}"))
+def sign(
+    card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
+    key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
+    reviewer: Annotated[str, typer.Option(help="Your id on reviewers.yaml.")],
+    root: Root = Path(),
+) -> int:
+    """Add your signature to a trial card.
+
+    Before, gates A to D are proved again, the plan must have been committed
+    before the evidence, nobody but the authors may have committed to the
+    candidate, evidence must be what its journals say (minutes), pages what reports
+    say. With the last signature that is needed, a run of gate E that waits goes on.
+    """
+    from gates.card import signing
+    from gates.card.resuming import go_on
+    from gates.overriders import require_in_force
+    from gates.proof import prove_chain
+
+    require_in_force(root, prove_chain(root, "D")[0])
+    require_beneath(root)
+    path = signing.sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
+    print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
+    go_on(root)
+    return 0
 
 
 @card.command(epilog=examples("genpolicy card keygen --id my-id --out ~/keys/my_key.pem"))

@@ -30,6 +30,7 @@ from gates.card.rollback import require_rollback
 from gates.card.signing import (
     CARDS,
     SignedCard,
+    envelope_path,
     independence,
     utc_today,
 )
@@ -164,7 +165,11 @@ def _waiting(what: str) -> Measured:
     return Measured(None, caveat=f"waits for a person: {what}", pending=True)
 
 
-def _signed(papers: Papers, what: str) -> SignedCard | Measured:
+def _signed(evidence: Evidence, dossier: Dossier, what: str) -> SignedCard | Measured:
+    """The card that people signed, or what is said where there is none; its papers are read."""
+    papers = dossier.papers
+    for path in (envelope_path(dossier.settings.card), ALLOW_LIST):
+        evidence.digest(path)
     if papers.signed is not None:
         return papers.signed
     if papers.present:
@@ -220,7 +225,7 @@ def _listed(missing: list[str]) -> str:
 )
 def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
     """1 if every signature verifies over this chain, else 0."""
-    found = _signed(dossier.papers, "sign the card")
+    found = _signed(evidence, dossier, "sign the card")
     if isinstance(found, Measured):
         return found
     names = ", ".join(f"{p.id} ({p.role})" for p in found.signers)
@@ -235,7 +240,7 @@ def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
 )
 def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
     """1 if the named reviewer signed, no signer is an author and the spotter is neither, else 0."""
-    found = _signed(dossier.papers, "review by someone who is no author")
+    found = _signed(evidence, dossier, "review by someone who is no author")
     if isinstance(found, Measured):
         return found
     independent, text = independence(found, load_allow_list(evidence.root))
@@ -250,7 +255,7 @@ def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
 )
 def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
     """Owners whose signatures verified."""
-    found = _signed(dossier.papers, "sign-off by model, perception, controller and safety owner")
+    found = _signed(evidence, dossier, "sign-off by model, perception, controller and safety owner")
     if isinstance(found, Measured):
         return found
     roles = {person.role for person in found.signers} & set(OWNERS)
@@ -266,7 +271,7 @@ def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
 )
 def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
     """Limits of the card other than simulated or looser than the draft; commands beyond them."""
-    found = _signed(dossier.papers, "complete the envelope")
+    found = _signed(evidence, dossier, "complete the envelope")
     if isinstance(found, Measured):
         return found if found.pending else Measured(None, caveat=found.caveat)
     draft = _draft_of(dossier.papers)
@@ -290,7 +295,7 @@ def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
 )
 def not_expired(evidence: Evidence, dossier: Dossier) -> Measured:
     """1 if today lies in its days, they are not too many, and no exception ends before, else 0."""
-    found = _signed(dossier.papers, "give the days of validity")
+    found = _signed(evidence, dossier, "give the days of validity")
     if isinstance(found, Measured):
         return found
     days = dossier.settings.maximum_days

@@ -5,7 +5,13 @@ from pathlib import Path
 
 from gates.card.card import DRAFT_PATH, TrialCard, read_card
 from gates.card.people import load_allow_list
-from gates.card.signing import CARDS, SignedCard, conflicting_cards, open_envelope
+from gates.card.signing import (
+    CARDS,
+    SignedCard,
+    conflicting_cards,
+    envelope_path,
+    open_envelope,
+)
 from gates.preregistration import NONE, read_plan
 from gates.protection import REHEARSED, is_rehearsal
 from gates.settings import read_params
@@ -33,7 +39,7 @@ class Papers:
 def examine(root: Path, name: str) -> Papers:
     """Read the draft and verify the envelope of that name, if there is one."""
     draft = _draft(root)
-    path = root / CARDS / f"{name}.dsse.json"
+    path = root / envelope_path(name)
     present = path.exists() or path.is_symlink()
     signed, refusal = None, ""
     if present:

@@ -191,6 +191,11 @@ def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool, str]:
     return True, f"reviewed by {card.reviewer}, {made}, {card.spotter} stands at the stop"
 
 
+def envelope_path(name: str) -> str:
+    """Path of the signed card of that name, relative to the repository."""
+    return f"{CARDS}/{name}.dsse.json"
+
+
 def conflicting_cards(root: Path, name: str) -> list[str]:
     """Other envelopes in `cards/` beside that of `name`; retired cards lie in a subfolder."""
     own = f"{name}.dsse.json"

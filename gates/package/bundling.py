@@ -122,7 +122,7 @@ def groups_of(root: Path, candidate: str) -> list[BundledGroup]:
             number=group.number,
             title=group.title,
             files=list(found[group.number]),
-            unmeasured=group.unmeasured,
+            unmeasured=group.lacks(root, candidate),
         )
         for group in GROUPS
     ]

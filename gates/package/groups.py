@@ -23,7 +23,11 @@ from genpolicy.integrity.tables import read_table
 
 LATENCY, SHADOW, STRESS = "artifacts/latency", "artifacts/shadow", "artifacts/stress"
 GENERATORS, BASELINES = "artifacts/train_generators", "artifacts/train_baselines"
-MEASURED = "artifacts/measure_baselines"
+MEASURED, MONITORS = "artifacts/measure_baselines", "artifacts/monitors"
+PROBED = tuple(
+    f"{MONITORS}/{name}.parquet" for name in ("alarms", "scores", "thresholds", "unavailable")
+)
+"""What the stage that runs out-of-distribution probes writes; without rows where none is asked."""
 IDENTITY = f"{RELOAD}/{CANDIDATES.file}"
 A, B, C, D, _ = (report_path(gate) for gate in GATES)
 
@@ -43,6 +47,19 @@ class Part:
 
 
 @dataclass(frozen=True)
+class Unmeasured:
+    """What a team may leave out, and the table whose rows say that it did not.
+
+    Attributes:
+        table: Path of the table.
+        text: What is said where it has no row of the candidate.
+    """
+
+    table: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Group:
     """One group.
 
@@ -50,13 +67,25 @@ class Group:
         number: In the chapter's order, from 1.
         title: The chapter's words, shortened.
         parts: What it consists of.
-        unmeasured: What of it no stage measures; said with every bundle.
+        unmeasured: What of it may not have been measured; said with the bundle where it was not.
     """
 
     number: int
     title: str
     parts: tuple[Part, ...]
-    unmeasured: str = ""
+    unmeasured: Unmeasured | None = None
+
+    def lacks(self, root: Path, candidate: str) -> str:
+        """What of it was not measured of a candidate; empty where all of it was.
+
+        Args:
+            root: Of the workspace, where the group is complete.
+            candidate: Its name.
+        """
+        asked = self.unmeasured
+        if asked is None or candidate in _spoken_of(root / asked.table, asked.table, "rows"):
+            return ""
+        return asked.text
 
 
 def _rows(*paths: str) -> tuple[Part, ...]:
@@ -93,8 +122,9 @@ GROUPS = (
     Group(10, "fallback transitions, watchdog, safety events",
           (*_rows(f"{SHADOW}/holds.parquet"), Part(f"{SHADOW}/journal.mcap"),
            Part(f"{SHADOW}/checker.json"), Part(f"{SHADOW}/mutants.json"),
-           Part(f"{STRESS}/checker.json"), Part(f"{STRESS}/journals/{{candidate}}__*.mcap")),
-          "out-of-distribution probes"),
+           Part(f"{STRESS}/checker.json"), Part(f"{STRESS}/journals/{{candidate}}__*.mcap"),
+           *map(Part, PROBED)),
+          Unmeasured(PROBED[0], "out-of-distribution probes: none was run of this candidate")),
     Group(11, "matched comparison and unmatched-evidence caveats",
           (Part(f"{GENERATORS}/matched.json"), Part(f"{STRESS}/power.json"),
            *_rows(f"{STRESS}/rollouts.parquet"), Part(f"{STRESS}/journals/*.mcap"),

@@ -38,7 +38,7 @@ class BundledGroup(StrictModel):
         number: In the chapter's order.
         title: What it is.
         files: Paths of its files.
-        unmeasured: What of it no stage measures.
+        unmeasured: What of it was not measured of this candidate; empty where all was.
     """
 
     number: int

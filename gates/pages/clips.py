@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import pandas as pd
@@ -26,6 +27,8 @@ from genpolicy.replay.journal_file import read_session
 from genpolicy.tasks.api import load_task
 
 MOST = 6
+MOST_SAID = 300
+"""Characters of why nothing is shown; a longer text ends in a mark."""
 KEPT_FILMS = 16
 """The desk is printed again by every gate; the same journal is not read twice in a process."""
 
@@ -64,7 +67,7 @@ def clips_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Clips:
             for number, (row, why) in enumerate(chosen[:MOST], start=1)
         ]
     except (MissingEvidenceError, GenpolicyError, LookupError, ValueError, TypeError) as error:
-        return Clips(missing=" ".join(str(error).split())[:200])
+        return Clips(missing=shorten(str(error), MOST_SAID, placeholder=" …"))
     return Clips(
         method=method,
         promoted=method == report.promoted,

@@ -85,7 +85,8 @@ def recounted(recount: Recount) -> str:
     where = " and ".join(recount.where) or "all rows"
     if recount.of:
         parts = " and ".join(recount.summed)
-        added = f"{parts} add{'' if len(recount.summed) > 1 else 's'} up to {number(recount.part or 0.0)}"
+        adds = f"add{'' if len(recount.summed) > 1 else 's'} up to"
+        added = f"{parts} {adds} {number(recount.part or 0.0)}"
         return f"{where}: {recount.of} adds up to {number(recount.whole)}, {added}"
     rows = f"{where}: {number(recount.whole)} row{'' if recount.whole == 1 else 's'}"
     if recount.part is None:

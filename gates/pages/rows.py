@@ -20,6 +20,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from gates.pages.rows_files import RowsFile, lines_of, sampled, whole_or_counted
+from gates.pages.rows_signed import signature_rows
 from gates.report import Answer, GateReport, report_path
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.errors import GenpolicyError
@@ -122,6 +123,10 @@ def rows_of(root: Path, report: GateReport) -> Rows:
                 lacking[path] = files
             else:
                 found += files
+    if report.gate == "E":
+        signed = signature_rows(root, report)
+        if signed is not None:
+            found.append(signed)
     return Rows(PurePosixPath(rows_folder(report.gate)).name, tuple(found), lacking)
 
 

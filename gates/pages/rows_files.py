@@ -16,6 +16,7 @@ import pyarrow as pa
 
 from genpolicy.integrity.hashing import sha256_bytes
 
+SIGNED_CARD = ".dsse.json"
 LARGEST_BYTES = 100_000
 """Of one file: 300 rollouts with all their columns are half of it, and git keeps every version."""
 HASH = re.compile(r"[0-9a-f]{64}")
@@ -60,6 +61,8 @@ class RowsFile:
     @property
     def title(self) -> str:
         """Its evidence without folder and ending, for a link."""
+        if self.path.endswith(SIGNED_CARD):
+            return PurePosixPath(self.name).stem
         stem = PurePosixPath(self.path).stem.replace("_", " ")
         stem = f"counts of {stem}" if self.folded else stem
         return f"{stem} of {self.method}" if self.method else stem

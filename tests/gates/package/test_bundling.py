@@ -25,7 +25,8 @@ def test_a_bundle_names_groups_verdicts_and_statements(whole, tmp_path):
     with zipfile.ZipFile(done.path) as archive:
         said = json.loads(archive.read(statement_path("B")))
     assert said["subject"][0]["digest"]["sha256"] == index.checkpoint
-    assert "out-of-distribution" in index.groups[9].unmeasured
+    assert "artifacts/monitors/alarms.parquet" in index.groups[9].files
+    assert not any(group.unmeasured for group in index.groups)
 
 
 def test_by_default_its_name_has_the_address(whole):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gates.package.groups import GROUPS, contents
+from gates.package.groups import GROUPS, PROBED, contents
 from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.integrity.tables import read_table, write_table
 
@@ -44,6 +44,21 @@ def test_a_table_without_a_row_of_it_is_not_complete(whole, table):
     write_table(path, rows.filter([name != "flow" for name in rows.column("method").to_pylist()]))
     with pytest.raises(BadInputError, match=f"nothing of it in {table}"):
         contents(whole, "flow", brought=False)
+
+
+def test_whose_probes_were_not_run_says_so_and_is_complete(whole):
+    """The stage writes its tables whether or not a probe is planned."""
+    group = GROUPS[9]
+    assert set(PROBED) <= set(contents(whole, "flow", brought=False)[10])
+    assert group.lacks(whole, "flow") == ""
+    path = whole / PROBED[0]
+    rows = read_table(path)
+    write_table(path, rows.filter([name != "flow" for name in rows.column("method").to_pylist()]))
+    assert group.lacks(whole, "flow") == (
+        "out-of-distribution probes: none was run of this candidate"
+    )
+    assert contents(whole, "flow", brought=False)[10]
+    assert {other.lacks(whole, "flow") for other in GROUPS if other is not group} == {""}
 
 
 def test_a_policy_that_was_brought_needs_its_entry_and_no_training(whole):
