@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 SIGN = "card sign --card completed.json --key my_key.pem --reviewer my-id"
 card = new_app("Make a key, fill a card, sign it, verify it.")
-card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
 
 
 @card.command(epilog=examples(f"genpolicy {SIGN}"))
@@ -42,6 +41,9 @@ def sign(
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
     go_on(root)
     return 0
+
+
+card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
 
 
 @card.command(epilog=examples("genpolicy card keygen --id my-id --out ~/keys/my_key.pem"))

@@ -6,6 +6,7 @@ from gates.asked_for import CHECKS_ASKED_FOR, NOT_ASKED_OF_EVERY_TASK
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.feasibility.settings import JOURNALS, SHADOW, FeasibilitySettings
+from gates.words import number
 from genpolicy.evidence.documents.shadow import CHECKER, MUTANTS, Checked, LayerMutant
 
 
@@ -45,7 +46,7 @@ def checked_violations(evidence: Evidence, folder: str, journals: str) -> Measur
     if not proved >= checked:
         raise MissingEvidenceError(f"the motion of {proved} of {checked} actions was proved")
     _require_totals(found)
-    text = f"{checked} actions proved again, their motion by other geometry"
+    text = f"{number(checked)} actions proved again, their motion by other geometry"
     broken = max(len(found.violations), sum(len(one.violations) for one in found.journals.values()))
     return Measured(float(broken), caveat=text)
 

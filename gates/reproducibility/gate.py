@@ -226,7 +226,8 @@ def samples_difference(
     if unequal and largest == 0.0:
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     seeds = rows["seed"].nunique()
-    text = f"{len(rows)} samples of {seeds} training seeds, {unequal} not bit-equal"
+    text = f"{len(rows)} samples of {seeds} training seed{'s' * (seeds > 1)}, "
+    text += f"{unequal} not bit-equal"
     if candidate not in settings.brought:
         text += _where_drawn(rows, settings.device)
     return Measured(largest, caveat=text)

@@ -9,12 +9,12 @@ from gates.reproducibility.contention import Ends, running, waited_share, weigh
 from gates.reproducibility.latency_budget import (
     LATENCY,
     MEASURED_HERE,
-    MILLI,
     P95,
     TERMS,
     spans_of_processes,
 )
 from gates.reproducibility.settings import ReproducibilitySettings
+from gates.words import duration, percent, three
 from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
 from genpolicy.statistics.equivalence import FEWEST, ratio_of_means, ratio_to, spread_found
 
@@ -73,12 +73,14 @@ def _ratio_of_runs(
     limit = _limit(settings, f"{temperature}_latency_ratio_upper")
     weighed = weigh(wall, without, share=share, limit=limit)
     text = (
-        f"{np.median(first) * MILLI:.4g} ms and {np.median(second) * MILLI:.4g} ms, {temperature}, "
+        f"{duration(np.median(first))} and {duration(np.median(second))}, {temperature}, "
         f"over {len(first)} processes each; {weighed.said}; {_least_stable(rows, temperature)}"
     )
     if limit is not None and limit > 1.0:
         spread = spread_found(limit, len(first), confidence=settings.confidence)
-        text += f"; equal runs pass in four of five if processes differ by {spread:.2g} at most"
+        text += (
+            f"; equal runs pass in four of five if processes differ by {percent(spread)} at most"
+        )
     counted = f"{len(first)} and {len(second)} processes"
     return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
 
@@ -109,7 +111,7 @@ def _least_stable(rows: pd.DataFrame, temperature: str) -> str:
     medians = own.pivot_table(index="component", columns="run", values="seconds", aggfunc="median")
     ratios = medians[1] / medians[2]
     ratios = ratios.where(ratios >= 1, 1 / ratios)
-    return f"least stable component {ratios.idxmax()} at {float(ratios.max()):.3g}"
+    return f"least stable component {ratios.idxmax()}, ×{three(float(ratios.max()))}"
 
 
 @criterion(
@@ -186,9 +188,10 @@ def _held(
     weighed = weigh(wall, without, share=share, limit=limit)
     measured, drawn = pair
     text = (
-        f"{method}: p95 of {len(high)} processes {np.median(measured) * MILLI:.4g} ms, drawn "
-        f"{np.median(drawn) * MILLI:.4g} ms from the others: "
-        f"{'took' if longer else 'drawn'} {wall.point:.3g} of it; {weighed.said}"
+        f"{method}: p95 of {len(high)} processes {duration(np.median(measured))}, drawn "
+        f"{duration(np.median(drawn))} from the others: "
+        f"{'measured over drawn' if longer else 'drawn over measured'} ×{three(wall.point)}; "
+        f"{weighed.said}"
     )
     counted = f"{len(high)} processes"
     return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)

@@ -70,7 +70,8 @@ def varied_difference(
         for way, part in rows.groupby("variation", sort=False)
         if not (part["unknown"] != "").any()
     ]
-    text = f"chunks not bit-equal, of {rows['seed'].nunique()} training seeds: {', '.join(parts)}"
+    seeds = rows["seed"].nunique()
+    text = f"chunks not bit-equal, of {seeds} training seed{'s' * (seeds > 1)}: {', '.join(parts)}"
     if measured.max() > 0.0:
         text += f"; most by {largest['variation']}, in {largest['component']}"
     for way, part in rows[rows["unknown"] != ""].groupby("variation", sort=False):

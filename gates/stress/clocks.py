@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import StressSettings
+from gates.words import points, three
 from genpolicy.errors import GenpolicyError
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow
@@ -145,8 +146,9 @@ def _said(item: Difference) -> str:
     kind, _, reason = item.name.partition(":")
     name = SHOWN[kind] + (f" as {reason}" if reason else "")
     low, high = item.interval
-    limit = "none fixed" if item.tolerance is None else f"{item.tolerance:g}"
-    return f"{name} {low:.2g} to {high:.2g}, tolerance {limit}"
+    said = three if kind == AGE else points  # of ages a distance, of the others shares
+    limit = "none fixed" if item.tolerance is None else said(item.tolerance)
+    return f"{name} {said(low)} to {said(high)}, tolerance {limit}"
 
 
 def _warm(rows: pd.DataFrame) -> pd.DataFrame:

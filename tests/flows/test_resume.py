@@ -72,6 +72,14 @@ def test_where_nothing_waits_it_says_so(tmp_path, capsys):
     assert f"for which no run of gate E waits in {database()}" in said
 
 
+def test_after_a_signature_it_is_no_fault_that_nothing_waits(tmp_path, monkeypatch, capsys):
+    words = ["--workspace", str(tmp_path), "--if-waiting"]
+    assert run_program(commands.resume, "resume", words) == 0
+    assert "No run of gate E waits in" in capsys.readouterr().out
+    monkeypatch.setattr(resume, "server_is_there", lambda: False)
+    assert run_program(commands.resume, "resume", words) == 0
+
+
 def test_without_the_server_that_was_named_nothing_is_asked(tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "server_is_there", lambda: False)
     assert main(tmp_path) == 1

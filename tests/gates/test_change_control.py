@@ -8,6 +8,7 @@ import yaml
 
 from gates.card.history import MEASURED
 from gates.change_control import control_of, control_text
+from gates.floor_history import FLOORS
 from gates.overrides import OVERRIDES
 from gates.run_commands import limits as command
 
@@ -230,3 +231,24 @@ def test_settings_of_a_commit_that_cannot_be_read_are_none(repo):
     commit("Mo", params=_params())
     moved = {(place, by.split()[0]) for _, place, _, _, by, _ in _said(root)}
     assert ("gate_d.fallback_share_upper", "Eve") in moved, "a limit that is gone is loosened"
+
+
+BOUND = 'Bound("D", "fallback_share_upper", "<=", {}, "why")\n'
+
+
+def test_a_bound_of_limits_that_moved_behind_the_evidence_is_listed(repo):
+    """Whoever loosens the bound makes room for a limit that nobody could have planned."""
+    root, commit = repo
+    (root / "gates").mkdir()
+    (root / FLOORS).write_text(BOUND.format(0.5))
+    commit(params=_params(), lock=_lock("stress"))
+    assert _said(root) == []
+    (root / FLOORS).write_text(BOUND.format(0.9))
+    place = f"{FLOORS}: D.fallback_share_upper"
+    assert _said(root) == [("loosened", place, "<= 0.5", "<= 0.9", "", ("stress",))]
+    sha = commit("Eve")
+    who = "Eve <eve@example.org>"
+    assert _said(root) == [("loosened", place, "<= 0.5", "<= 0.9", who, ("stress",))]
+    assert f"{place}: <= 0.5 -> <= 0.9, by {who}, {sha[:10]}" in control_text(control_of(root))
+    commit(lock=_lock("stress").replace(".dir", "1.dir"))
+    assert _said(root) == [], "what was measured again was judged by it from the start"

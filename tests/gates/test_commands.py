@@ -14,6 +14,7 @@ from test_differences import REPORT
 from test_verdicts import criterion
 
 from gates import commands
+from gates.card import commands as card_commands
 from gates.commands import gates, sign, verify
 from gates.proof import Admission, Rung
 from genpolicy.cli.shell import run_program
@@ -150,10 +151,12 @@ def test_nobody_signs_before_chain_history_and_journals_were_asked(stand_in, ben
     put("gates.overriders.require_in_force")
     put("gates.card.signing.sign_card", Path("cards/x.json"))
     calls.clear()
-    assert commands.sign_card(Path("c.json"), Path("k.pem"), "rita", ROOT) == 0
+    put("gates.card.resuming.go_on")
+    calls.clear()
+    assert card_commands.sign(Path("c.json"), Path("k.pem"), "rita", ROOT) == 0
     signed = ("sign_card", ROOT, Path("c.json"), Path("k.pem"), "rita")
     before = [("prove_chain", ROOT, "D"), ("require_in_force", ROOT, "reports")]
-    assert calls == [*before, *beneath[0], signed]
+    assert calls == [*before, *beneath[0], signed, ("go_on", ROOT)]
     said = "Signed x.json as rita. Judge gate E again to see what is missing.\n"
     assert capsys.readouterr().out == said
 

@@ -102,21 +102,23 @@ def test_a_waiver_of_what_could_not_be_asked_is_not_testable(caveat, silent):
     assert any(text.startswith("Gate A, not testable") for text in for_a_card(report, "flow"))
 
 
-LATE = "worst in nominal: 0.1, bounded by 0.2; cold at most 0.8 s, beyond the maximum action age"
+LATE = "worst in nominal: 100 ms; cold at most 1.2 s, beyond the maximum action age"
 
 
 def test_a_first_answer_that_comes_too_late_is_a_cold_start():
-    (doubt,) = said("cold start", answer(name="latency_p95_s", caveat=f"{LATE} of 0.45 s"))
-    assert "up to 0.8 s" in doubt.text and "older than 0.45 s" in doubt.text
+    (doubt,) = said("cold start", answer(name="latency_p95_s", caveat=f"{LATE} of 450 ms"))
+    assert "up to 1.2 s" in doubt.text and "older than 450 ms" in doubt.text
     assert doubt.candidate == "flow" and doubt.criteria == ("latency_p95_s",)
-    assert not said("cold start", answer(caveat="bounded by 0.2; cold at most 0.4 s"))
+    assert not said("cold start", answer(caveat="at most 200 ms; cold at most 400 ms"))
 
 
 def test_a_mean_that_one_condition_does_not_share_is_an_average():
-    (doubt,) = said("an average", answer(caveat="worst in camera_delay -0.125 over bc"))
+    (doubt,) = said("an average", answer(caveat="worst in camera_delay -12.5 points over bc"))
     assert "in camera_delay it is -12.5 points" in doubt.text
-    assert not said("an average", answer(caveat="worst in camera_delay +0.125 over bc"))
-    assert not said("an average", answer("FAIL", caveat="worst in camera_delay -1 over bc"))
+    assert not said("an average", answer(caveat="worst in camera_delay +12.5 points over bc"))
+    assert not said(
+        "an average", answer("FAIL", caveat="worst in camera_delay -100 points over bc")
+    )
 
 
 @pytest.mark.parametrize(("counted", "few"), [

@@ -194,3 +194,14 @@ def test_a_report_that_is_refused_does_not_say_who_fell(ladder: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b'"flow": "PASS"', b'"flow": "FAIL"'))
     lines = {line.stage: line for line in overview(ladder, prove_all(ladder))}
     assert lines["gate_d"].verdict == "REFUSED" and lines["gate_d"].stopped == ()
+
+
+def test_what_is_overridden_is_red_and_below_its_gate_whatever_the_verdict() -> None:
+    """The sentence is the decision's own; it stands apart from what decided."""
+    told = "OVERRIDDEN: hold_share_upper of flow by rita; without, gate D FAIL."
+    line = Line("gate_d", "PASS", "promote flow", 1.0, 1, (), told)
+    for terminal in (False, True):
+        plain = as_text([line], terminal=terminal)
+        assert told in plain and "\x1b" not in plain
+        coloured = as_text([line], terminal=terminal, colour=True)
+        assert f"\x1b[31m{'  ' * terminal}{told}\x1b[0m" in coloured

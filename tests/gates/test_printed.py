@@ -76,6 +76,32 @@ def test_a_line_for_each_gate(capsys):
     ]
 
 
+@pytest.mark.parametrize("verdict", ["PASS", "FAIL"])
+def test_what_is_overridden_is_said_in_red_where_there_is_colour(monkeypatch, capsys, verdict):
+    told = "OVERRIDDEN: nfe_mismatch of flow by rita; without, gate B FAIL."
+    decided = "" if verdict == "PASS" else "nfe: 5"
+    rung = Rung("B", "b", verdict, decided, f"Go on. {told}", "reports/gate_b.json", 0)
+    print_rungs([rung], as_json=False)
+    said = decided or "Go on."
+    assert capsys.readouterr().out.endswith(f"  {said} {told}\n")
+    monkeypatch.setattr(printed, "coloured", lambda: True)
+    print_rungs([rung], as_json=False)
+    assert capsys.readouterr().out.endswith(f"  {said} \x1b[31m{told}\x1b[0m\n")
+
+
+@pytest.mark.parametrize(
+    ("page", "command"),
+    [
+        ("reports/gate_c.html", "dvc repro -f gate_c"),
+        ("reports/gate_e/signatures.csv", "dvc repro -f gate_e"),
+        (INDEX, "python -m gates.writing"),
+    ],
+)
+def test_a_page_is_printed_again_by_its_own_stage(tmp_path, monkeypatch, page, command):
+    monkeypatch.setattr(printed, "changed_page", lambda root: page)
+    assert f"Run `{command}`, which prints it again" in page_problem(tmp_path)[1]
+
+
 def test_the_same_as_json_whole_and_in_their_own_letters(capsys):
     print_rungs([*RUNGS, Rung("D", "stress", "FAIL", "é ≤ 1", "", "r", 3)], as_json=True)
     out = capsys.readouterr().out

@@ -13,6 +13,7 @@ from gates.cause import (
 )
 from gates.cause.confidence import UNSEEN
 from gates.cause.numbers import Kept, Labels, Residual
+from gates.words import share_of
 from genpolicy.audit.rows import Finding
 from genpolicy.errors import ConfigError
 
@@ -123,7 +124,7 @@ def test_labels_are_contaminated_from_one_disagreement_on(labels, name, kind):
     assert (answer.limit is None) == (answer.measured is None) == (labels.replays == 0)
     assert answer.interval is None or answer.interval[1] == answer.measured
     assert (answer.interval is None) == (labels.replays == 0)
-    told = f"{labels.disagreements} of {labels.replays} replayed"
+    told = share_of(labels.disagreements, labels.replays, "replayed")
     assert answer.note == (told if labels.replays else "no replay: labels are taken as they are")
 
 

@@ -42,7 +42,7 @@ def test_too_few_observations_are_no_proof_of_a_small_share_and_no_failure(ladde
     report = judge(ladder, "C")
     found = next(c for c in found_in(report, "stub_violation_upper") if c.candidate == "flow")
     assert (found.verdict, found.measured) == ("INCONCLUSIVE", None)
-    assert "none bad of 120 observations" in found.caveat and "0.03027" in found.caveat
+    assert "none bad of 120 observations" in found.caveat and "3.03 %" in found.caveat
     evidence.edit_table(ladder, STUB, cells("delivered", 0, where=of))
     assert judge(ladder, "C").candidates["flow"] == "INCONCLUSIVE"
     # One that is bad among 120 is no want of evidence.

@@ -120,7 +120,7 @@ def test_the_mean_is_defeated_only_where_every_mode_passes(ladder):
 
 def test_what_disturbed_demonstrations_did_is_shown_and_never_judged(ladder):
     before = asked(ladder, modes.mode_success_lower, gate="A")
-    assert "(shown, not judged): left 38 of 40, right 8 of 40" in before.caveat
+    assert "(shown, not judged): left 95 % (38 of 40), right 20 % (8 of 40)" in before.caveat
     evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(successes=0))
     assert asked(ladder, modes.mode_success_lower, gate="A").value == before.value
     (ladder / "artifacts/audit/recovery.parquet").unlink()
@@ -137,7 +137,7 @@ def test_the_median_is_shown_beside_the_mean_and_not_judged(ladder):
     count = len(evidence.read_table(ladder / "artifacts" / SITUATIONS).to_pandas())
     assert said().value == before.value and judge(ladder, "A").verdict == "PASS"
     assert "the median of the neighbours passes in" in before.caveat
-    found = re.search(r"passes in (\d+) of (\d+) ", said().caveat)
+    found = re.search(r"passes in 100 % \((\d+) of (\d+)\) ", said().caveat)
     assert found and found[1] == found[2] and 0 < int(found[1]) <= count
     evidence.edit_table(ladder, SITUATIONS, cells("median_admissible", None, share=1.0))
     with pytest.raises(MissingEvidenceError, match="the median was not checked"):

@@ -124,7 +124,7 @@ def test_a_residual_beyond_the_limit_that_noise_explains_is_not_decided(ladder, 
 
 def test_the_number_of_a_pair_is_that_of_its_weaker_mode(ladder):
     answers = {answer.id: answer for answer in judge(ladder, "A").criteria}
-    assert "24 of 25 succeed" in answers["mode_success_lower"].caveat
+    assert "96 % (24 of 25 episodes) succeed" in answers["mode_success_lower"].caveat
     assert answers["mode_success_lower"].interval is not None
     assert answers["mode_feasible_share"].measured == 0.98
 

@@ -8,6 +8,7 @@ import pytest
 from gates.evidence import MissingEvidenceError
 from gates.need.simpler import redrawn_validity, valid_share
 from gates.proof import judge
+from gates.recount import AtLeast
 from gates.writing import write_gate
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -24,6 +25,10 @@ def rows(**changes):
     return pd.DataFrame([{**base, "episode_uuid": f"e{i}", **changes} for i in range(10)])
 
 
+def valid_of(frame):
+    return valid_share("modes", frame, AtLeast("samples", 1), confidence=0.95)
+
+
 @pytest.mark.parametrize(
     ("changes", "share"),
     [
@@ -32,19 +37,20 @@ def rows(**changes):
     ],
 )  # fmt: skip
 def test_valid_is_a_reached_mode_and_every_sample_admissible(changes, share):
-    value, lower, upper, (count, episodes) = valid_share(rows(**changes), confidence=0.95)
-    assert (value, count, episodes) == (share, 10, 10)
-    assert (lower, upper) == clopper_pearson(int(10 * share), 10, 0.95)
+    valid = valid_of(rows(**changes))
+    assert (valid.share, valid.recount.whole, valid.episodes) == (share, 10, 10)
+    assert (valid.lower, valid.upper) == clopper_pearson(int(10 * share), 10, 0.95)
 
 
 def test_valid_share_counts_episodes_and_only_situations_with_two_modes():
     frame = pd.concat([rows(), rows(modes_present=1)])
-    assert valid_share(frame, confidence=0.95)[3] == (10, 10)
-    one = rows().assign(episode_uuid="same")
-    assert valid_share(one, confidence=0.95)[3] == (10, 1)
-    assert valid_share(one, confidence=0.95)[1] == clopper_pearson(1, 1, 0.95)[0]
+    valid = valid_of(frame)
+    assert (valid.recount.whole, valid.episodes) == (10, 10)
+    one = valid_of(rows().assign(episode_uuid="same"))
+    assert (one.recount.whole, one.episodes) == (10, 1)
+    assert one.lower == clopper_pearson(1, 1, 0.95)[0]
     with pytest.raises(MissingEvidenceError, match="two modes"):
-        valid_share(rows(modes_present=1), confidence=0.95)
+        valid_of(rows(modes_present=1))
 
 
 def test_a_chunk_that_reaches_a_mode_but_is_refused_has_removed_nothing(ladder):
@@ -117,7 +123,7 @@ def test_only_conditioning_factors_can_remove_the_mean(ladder):
 def test_ibc_is_reported_beside_the_deployed_baselines_and_not_judged(ladder):
     criterion = found(ladder, "baseline_mode_coverage")
     assert criterion.measured == 0.0 and criterion.verdict == "PASS"
-    assert "ibc, derivative_free 1 (100% of samples admissible)" in criterion.caveat
+    assert "ibc, derivative_free 100 % (100 % of its samples admissible)" in criterion.caveat
     # A convention under which others are deployed does not make an energy deterministic.
     evidence.edit_table(
         ladder, "measure_baselines/modes.parquet", lambda f: f.assign(convention="direct")
@@ -138,9 +144,9 @@ def test_all_that_are_drawn_at_random_are_told_and_the_best_comes_first(ladder):
 
     evidence.edit_table(ladder, "measure_baselines/modes.parquet", drawn)
     assert found(ladder, "baseline_mode_coverage").caveat.endswith(
-        "; drawn at random, as a generator: ibc, derivative_free 1 (100% of samples admissible), "
-        "ibc, langevin 0.5 (25% of samples admissible), "
-        "ibc, annealed 0.5 (25% of samples admissible)"
+        "; drawn at random, as a generator: ibc, derivative_free 100 % (100 % of its samples "
+        "admissible), ibc, langevin 50 % (25 % of its samples admissible), "
+        "ibc, annealed 50 % (25 % of its samples admissible)"
     )
 
 
@@ -203,7 +209,10 @@ def test_one_mode_is_shown_and_left_to_motion(ladder):
         }),
     )  # fmt: skip
     criterion = found(ladder, "remedy_valid_share")
-    assert criterion.verdict == "PASS" and "one_mode_bc 1 (shown, not judged" in criterion.caveat
+    assert (
+        criterion.verdict == "PASS"
+        and "one_mode_bc in 100 % (shown, not judged" in criterion.caveat
+    )
 
 
 @pytest.mark.parametrize("name", ["chunked_l1", "bc_noise"])
@@ -218,7 +227,8 @@ def test_each_remedy_that_acts_validly_fails_the_gate(ladder, name):
     report = judge(ladder, "A")
     criterion = found(ladder, "remedy_valid_share")
     assert report.verdict == "FAIL" and criterion.verdict == "FAIL"
-    assert criterion.measured == 1.0 and criterion.caveat.startswith(f"{name} with 1 of 30")
+    assert criterion.measured == 1.0 and f"{name} in 100 %" in criterion.caveat
+    assert criterion.caveat.startswith("of 30 situations, with ")
 
 
 @pytest.mark.parametrize("name", list(evidence.REMEDIES))
@@ -308,5 +318,5 @@ def test_a_situation_with_one_mode_asks_no_simple_policy(ladder):
     evidence.edit_table(ladder, "measure_baselines/modes.parquet", change)
     for name in ("remedy_valid_share", "chunking_valid_share"):
         criterion = found(ladder, name)
-        assert "of 20 situations" in criterion.caveat and criterion.interval[0] == 0.0
+        assert criterion.recount.whole == 20 and criterion.interval[0] == 0.0
     assert found(ladder, "baseline_mode_coverage").measured == 0.0

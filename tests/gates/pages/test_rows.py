@@ -11,8 +11,11 @@ import pytest
 
 from gates.evidence import Evidence
 from gates.pages import rows as module
+from gates.pages import rows_files
+from gates.pages.numbers import recounted
 from gates.pages.page import gate_page
-from gates.pages.rows import CRITERIA, LARGEST_BYTES, printed_rows, rows_folder, rows_of
+from gates.pages.rows import CRITERIA, printed_rows, rows_folder, rows_of
+from gates.pages.rows_files import LARGEST_BYTES
 from gates.proof import judge
 from genpolicy.integrity.hashing import sha256_file
 
@@ -71,6 +74,106 @@ def test_a_document_is_its_values_by_place(rows, whole):
     stated = json.loads((whole / "artifacts/stress/checker.json").read_text())
     assert int(found["checked_actions"]) == stated["checked_actions"] and len(found) == file.of
     assert {place.split(".")[0].split("[")[0] for place in found} == set(stated)
+
+
+SHARES = {
+    "A": "label_disagreement mode_success_lower mode_feasible_share mean_defeated_share "
+         "chunking_valid_share factor_valid_share",
+    "B": "mode_coverage_lower outside_modes_upper",
+    "C": "admissible_share corrupted_refused_share stub_stale stub_invalid",
+    "D": "nominal_success_lower stress_success_lower deadline_miss_upper hold_share_upper "
+         "rejection_share_upper fallback_share_upper intervention_upper reset_upper "
+         "recovery_success_lower stub_violations",
+}  # fmt: skip
+"""Criteria whose number is a share of rows, or of a column of them."""
+
+
+def holds(row, said):
+    """Whether what a report says of a row holds of its cells, read from the words alone."""
+    if said.startswith("not ("):
+        return not all(holds(row, part) for part in said[5:-1].split(" and "))
+    column, sign, than = said.split(" ", 2)
+    if sign == ">=":
+        factor, times, other = than.rpartition(" * ")
+        bound = float(row[other]) if other in row else float(other)
+        return float(row[column]) >= (float(factor) if times else 1.0) * bound
+    values = ["" if value == "(empty)" else row.get(value, value) for value in than.split(" or ")]
+    return (row[column] in values) == (sign == "=")
+
+
+def counted_again(file, recount):
+    """Whole and part of a number, from the cells of a file and the words of its report."""
+    found = [row for row in read(file.data) if all(holds(row, said) for said in recount.where)]
+    many = [int(row[rows_files.EQUAL_ROWS]) if file.folded else 1 for row in found]
+
+    def total(column):
+        return sum(float(row[column]) * n for row, n in zip(found, many, strict=True))
+
+    whole = total(recount.of) if recount.of else sum(many)
+    if recount.summed:
+        return whole, sum(total(column) for column in recount.summed)
+    hit = [all(holds(row, said) for said in recount.hits) for row in found]
+    return whole, sum(n for n, one in zip(many, hit, strict=True) if one)
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_a_share_is_counted_again_from_its_rows_by_the_filter_that_is_stated(rows, judged, gate):
+    """From the printed bytes and the printed words: nothing of the judge is asked."""
+    seen = set()
+    for answer in judged(gate).criteria:
+        if answer.recount is None:
+            continue
+        file = rows[gate].recounted(answer)
+        assert file is not None and file.path in answer.evidence, answer.id
+        whole, part = counted_again(file, answer.recount)
+        assert whole == answer.recount.whole > 0, (answer.id, answer.recount)
+        if answer.recount.part is not None:
+            assert part == answer.recount.part, (answer.id, answer.recount)
+            seen.add(answer.id)
+        assert all(said in recounted(answer.recount) for said in answer.recount.where)
+    assert seen == set(SHARES[gate].split())
+
+
+def test_another_row_is_another_count(copied, judged):
+    """The same filter on altered rows does not give the number of the report."""
+    first = lambda f: (f["method"] == "flow") & (f["perturbation"] == "nominal")  # noqa: E731
+    evidence.edit_table(
+        copied, "stress/rollouts.parquet",
+        lambda f: f.assign(success=f["success"] & ~first(f), outcome=f["outcome"].mask(
+            first(f), "timeout")),
+    )  # fmt: skip
+    after = judge(copied, "D")
+    (before,) = [a for a in judged("D").criteria
+                 if (a.id, a.candidate) == ("nominal_success_lower", "flow")]  # fmt: skip
+    file = rows_of(copied, after).recounted(before)
+    assert counted_again(file, before.recount) == (before.recount.whole, 0)
+    assert before.recount.part > 0
+
+
+def test_of_a_sampled_table_all_rows_are_counted_equal_ones_in_one_line(rows, judged, whole):
+    (answer,) = [a for a in judged("D").criteria
+                 if (a.id, a.candidate) == ("latency_p95_s", "flow")]  # fmt: skip
+    file = rows["D"].recounted(answer)
+    frame = pd.read_parquet(whole / "artifacts/stress/invocations.parquet")
+    own = frame[frame["method"] == "flow"]
+    assert file.folded and file.name == "stress.invocations.flow.counts.csv"
+    assert file not in rows["D"].of(file.path) and len(file.data) <= LARGEST_BYTES
+    found = read(file.data)
+    assert set(found[0]) == {*answer.recount.columns, rows_files.EQUAL_ROWS}
+    assert sum(int(row[rows_files.EQUAL_ROWS]) for row in found) == file.of == len(own)
+    assert file.title == "counts of invocations of flow"
+
+
+def test_counts_that_do_not_fit_are_left_out_and_not_sampled(whole, judged, monkeypatch):
+    rows = rows_of(whole, judged("D"))
+    assert any(file.folded for file in rows.files)
+    module._split.cache_clear()
+    monkeypatch.setattr(rows_files, "LARGEST_BYTES", 300)
+    small = rows_of(whole, judged("D"))
+    module._split.cache_clear()
+    (answer,) = [a for a in judged("D").criteria
+                 if (a.id, a.candidate) == ("latency_p95_s", "flow")]  # fmt: skip
+    assert not any(file.folded for file in small.files) and small.recounted(answer) is None
 
 
 def test_a_row_names_its_rollout_where_the_journal_is_evidence(whole, judged, monkeypatch):
@@ -164,6 +267,9 @@ def test_the_criteria_stand_beside_them_with_all_digits(rows, judged, gate):
         assert (float(row["measured"]) if row["measured"] else None) == answer.measured
         assert (row["low"] == "") == (answer.interval is None)
         assert set(row["rows"].split()) <= set(printed) and row["rows"]
+        if answer.recount is not None:
+            assert row["recount"] in printed and row["where"] == "; ".join(answer.recount.where)
+            assert float(row["whole_value"]) == answer.recount.whole
 
 
 def test_without_evidence_the_criteria_still_stand_there(tmp_path, judged):

@@ -25,7 +25,7 @@ def test_a_candidate_whose_samples_still_change_is_red(ladder, better):
     assert red(report) == {"late_change_upper"}
     found = found_in(report, "late_change_upper")[0]
     assert found.measured == pytest.approx(0.25) and found.interval == (0.25, 0.25)
-    assert f"valid samples {-0.25 if better == EARLIER else 0.25:+.4g}" in found.caveat
+    assert f"valid samples {'-' if better == EARLIER else '+'}25 points" in found.caveat
     assert "last quarter of 4000 updates, 20 held-out episodes" in found.caveat
 
 
@@ -43,7 +43,7 @@ def test_the_worse_end_of_a_loss_of_samples_decides(ladder):
     """Half of the situations lose a quarter: the lower end lies further away than the change."""
     evidence.edit_table(ladder, MODES, lambda f: f.assign(valid=16 - 4 * (f["index"] % 2)))
     found = found_in(judge(ladder, "B"), "late_change_upper")[0]
-    assert found.verdict == "INCONCLUSIVE" and "valid samples -0.125" in found.caveat
+    assert found.verdict == "INCONCLUSIVE" and "valid samples -12.5 points" in found.caveat
     assert found.interval[0] < 0.125 < 0.15 < found.interval[1] == found.measured
 
 

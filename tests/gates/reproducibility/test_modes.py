@@ -23,7 +23,7 @@ def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
         )  # fmt: skip
     report = judge(ladder, "B")
     assert red(report) == {"outside_modes_upper"}
-    assert "share 0.45" in found_in(report, "outside_modes_upper")[0].caveat
+    assert "45 % (270 of 600 samples)" in found_in(report, "outside_modes_upper")[0].caveat
 
 
 def test_samples_far_from_every_mode_lie_outside_as_well(ladder):
@@ -42,7 +42,8 @@ def test_a_mode_counts_from_its_share_of_admissible_samples_on(ladder, fewest, p
     assert (report.verdict == "PASS") is passes
     assert red(report) == (set() if passes else {"mode_coverage_lower"})
     caveat = found_in(report, "mode_coverage_lower")[0].caveat
-    assert f"in {30 if passes else 0} of 30 two-mode situations" in caveat
+    share = "100 % (30" if passes else "0 % (none"
+    assert f"in {share} of 30 two-mode situations) every mode gets" in caveat
 
 
 def test_situations_of_one_episode_are_one_draw_of_the_coverage(ladder):

@@ -132,7 +132,9 @@ def test_a_baseline_that_is_drawn_too_long_is_seen_and_one_that_is_drawn_too_sho
         return asked(ladder, latency_model_ratio_upper, "flow", gate="B")
 
     assert ratio(0.5).value == pytest.approx(2.0)
-    assert ratio(0.5).caveat.startswith(f"{name}: ") and "drawn 2 of it" in ratio(0.5).caveat
+    assert (
+        ratio(0.5).caveat.startswith(f"{name}: ") and "drawn over measured ×2;" in ratio(0.5).caveat
+    )
     assert ratio(2.0).value == pytest.approx(1.0)
 
 
@@ -246,4 +248,4 @@ def test_the_least_stable_component_is_named_whichever_run_was_slower(ladder):
 
     evidence.edit_table(ladder, LATENCY, change)
     for name in RATIOS.values():
-        assert "least stable component encode at 2" in found_in(judge(ladder, "B"), name)[0].caveat
+        assert "least stable component encode, ×2" in found_in(judge(ladder, "B"), name)[0].caveat

@@ -179,9 +179,9 @@ def test_the_cold_invocation_is_said_and_not_judged(ladder):
     evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 30.0, where=cold))
     found = flow(ladder, cost.latency_p95_s)
     assert found.value < 0.1
-    assert "cold at most 30 s, beyond the maximum action age of 0.45 s" in found.caveat
+    assert "cold at most 30 s, beyond the maximum action age of 450 ms" in found.caveat
     evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.45, where=cold))
-    assert flow(ladder, cost.latency_p95_s).caveat.endswith("cold at most 0.45 s")
+    assert flow(ladder, cost.latency_p95_s).caveat.endswith("cold at most 450 ms")
 
 
 def test_where_phases_differ_the_oldest_action_of_any_of_them_counts(ladder):

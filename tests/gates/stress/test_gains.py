@@ -45,9 +45,10 @@ def test_the_worst_condition_comes_first_with_the_baseline_that_gains_most_on_it
     won(ladder, "nominal", "act", every(2))
     text = told(ladder)
     assert text.startswith(
-        f"on {evidence.STARTS} starts in each condition, worst in queue_reorder -1 over bc_noise, "
+        f"on {evidence.STARTS} starts in each condition, worst in queue_reorder "
+        "-100 points over bc_noise, "
     )
-    assert ", nominal +0.5 over act" in text
+    assert ", nominal +50 points over act" in text
     assert all(text.count(f"{name} ") == 1 for name in evidence.CONDITIONS)
     assert (
         f"; {text}; inside the envelope"
@@ -84,7 +85,9 @@ def test_what_is_gained_outside_the_envelope_alone_is_no_promotion(ladder):
     report = judge(ladder, "D")
     (answer,) = [c for c in found_in(report, promotion_e_value.id) if c.candidate == "flow"]
     assert answer.verdict == "INCONCLUSIVE" and report.candidates["flow"] == "INCONCLUSIVE"
-    assert "inside the envelope +0 over " in answer.caveat and before.value >= answer.threshold
+    assert (
+        "inside the envelope +0 points over " in answer.caveat and before.value >= answer.threshold
+    )
 
 
 def test_a_loss_that_is_shown_inside_the_envelope_fails(ladder):

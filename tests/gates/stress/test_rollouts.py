@@ -15,6 +15,7 @@ from gates.stress.rollouts import (
     in_every_condition,
     rollouts,
     success_lower,
+    within,
 )
 from gates.stress.trial import unmatched_starts
 from genpolicy.evidence.stress.state import Outcome
@@ -68,7 +69,7 @@ def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_tri
     evidence.edit_table(ladder, TABLE, spoil)
     found = success_lower(Evidence(ladder), settings, "flow", evidence.CONDITIONS)
     assert (found.value, found.interval[1]) == clopper_pearson(20, 80, settings.confidence)
-    assert found.caveat.startswith("camera_delay: share 0.25")
+    assert found.caveat.startswith("camera_delay: 25 % (20 of 80 rollouts) succeed; at least 1")
     undisturbed = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
     assert undisturbed.value > found.value
 
@@ -127,12 +128,16 @@ def test_the_highest_bound_of_all_conditions_is_judged_and_the_others_are_said()
     rows = pd.DataFrame(
         {"perturbation": ["calm", *3 * ["storm"]], "start": [0, 0, 1, 1], "value": [1.0, 2, 3, 2.5]}
     )
-    found = in_every_condition(
-        rows, ("calm", "storm"), lambda part, _: (part["value"].mean(), 0.0, part["value"].max())
-    )
+
+    def measure(part, condition):
+        interval = part["value"].mean(), 0.0, part["value"].max()
+        return interval, within("rollouts", condition).counted(part)
+
+    found = in_every_condition(rows, ("calm", "storm"), measure, "{:g} N".format)
     assert (found.value, found.interval) == (3.0, (0.0, 3.0))
-    assert found.caveat == "worst in storm: 2.5, bounded by 3; calm 1"
+    assert found.caveat == "worst in storm: 2.5 N, at most 3 N; at most in the others: calm 1 N"
     assert found.counted == "2 starts"
+    assert found.recount.where == ("perturbation = storm",) and found.recount.whole == 3.0
 
 
 def test_the_undisturbed_condition_alone_is_no_comparison(ladder):

@@ -81,7 +81,9 @@ def test_drills_that_succeed_do_not_hide_a_condition_that_is_shown_to_fail(ladde
     begun(ladder, "camera_delay", 16, 1)
     found = recovery(ladder)
     assert found.value == clopper_pearson(1, 16, 0.95)[0] < 0.5
-    assert found.caveat.startswith("worst in camera_delay: 0.0625 of 16 recoveries on 16 starts")
+    assert found.caveat.startswith(
+        "worst in camera_delay: 6.25 % (1 of 16 recoveries) on 16 starts"
+    )
 
 
 def test_every_condition_with_starts_enough_must_show_it(ladder):
@@ -117,7 +119,7 @@ def test_starts_that_recover_under_one_seed_only_count_to_its_advantage(ladder):
     evidence.edit_table(ladder, ROLLOUTS, second)
     found = recovery(ladder)
     assert found.interval == clopper_pearson(1, 5, 0.95) and found.value == found.interval[1]
-    assert found.caveat.startswith("worst in camera_delay: 0.1 of 10 recoveries on 5 starts")
+    assert found.caveat.startswith("worst in camera_delay: 10 % (1 of 10 recoveries) on 5 starts")
 
 
 def test_one_failure_of_three_in_a_condition_shows_nothing_about_it(ladder):

@@ -107,7 +107,7 @@ def test_only_the_planned_effect_counts_as_found(ladder):
         document["rows"] = [huge, {**planned, "promote_share": 0.47, "return_share": 0.53}, none]
 
     evidence.edit_document(ladder, POWER, change)
-    with pytest.raises(MissingEvidenceError, match=r"0\.5 against 0\.95 is promoted in 0\.47"):
+    with pytest.raises(MissingEvidenceError, match="95 % against 50 % is promoted in 47 %"):
         asked(ladder, verdict_reachable, gate="D")
 
 
