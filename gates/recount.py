@@ -186,10 +186,11 @@ class Subset:
             hits: What holds of a hit; none where rows alone are counted.
         """
         columns = dict.fromkeys(name for term in (*self.terms, *hits) for name in term.columns)
-        return self._said(
-            frame, tuple(columns), float(len(frame)), hits=tuple(map(str, hits)),
-            part=float(np.sum(all_hold(hits, frame))) if hits else None,
-        )  # fmt: skip
+        found = self._of_rows(frame, tuple(columns), float(len(frame)))
+        if not hits:
+            return found
+        part = float(np.sum(all_hold(hits, frame)))
+        return found.model_copy(update={"hits": tuple(map(str, hits)), "part": part})
 
     def summed(self, frame: pd.DataFrame, parts: tuple[str, ...], whole: str) -> Recount:
         """What is added up again: columns of these rows, and the column that they are parts of.
@@ -203,26 +204,23 @@ class Subset:
             MissingEvidenceError: A column holds no counts.
         """
         columns = dict.fromkeys(name for term in self.terms for name in term.columns)
-        return self._said(
-            frame, (*columns, *parts, whole), float(counts(frame, whole).sum()), of=whole,
-            summed=parts, part=float(sum(counts(frame, name).sum() for name in parts)),
-        )  # fmt: skip
+        total = float(counts(frame, whole).sum())
+        found = self._of_rows(frame, (*columns, *parts, whole), total)
+        part = float(sum(counts(frame, name).sum() for name in parts))
+        return found.model_copy(update={"of": whole, "summed": parts, "part": part})
 
-    def _said(
-        self, frame: pd.DataFrame, columns: tuple[str, ...], whole: float, *, part: float | None,
-        of: str = "", hits: tuple[str, ...] = (), summed: tuple[str, ...] = (),
-    ) -> Recount:  # fmt: skip
+    def _of_rows(self, frame: pd.DataFrame, columns: tuple[str, ...], whole: float) -> Recount:
         methods = set(frame["method"]) if "method" in frame else set()
         return Recount(
             table=self.table,
             method=str(methods.pop()) if len(methods) == 1 else "",
             where=tuple(map(str, self.terms)),
             columns=columns,
-            of=of,
+            of="",
             whole=whole,
-            hits=hits,
-            summed=summed,
-            part=part,
+            hits=(),
+            summed=(),
+            part=None,
         )
 
 

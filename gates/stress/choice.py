@@ -105,7 +105,7 @@ def ranked(
     )
     text = (
         f"promote either of {', '.join(left)}, {IN_SHORT}{better}: no paired test "
-        f"tells them apart (at most {most.e_value:.3g} that {most.better} is better than "
+        f"tells them apart (an e-value of {most.e_value:.3g} that {most.better} is better than "
         f"{most.other} by {points(most.gain)}; "
         f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
     )
