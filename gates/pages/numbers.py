@@ -21,6 +21,8 @@ RATES = (
     "_reachable",
 )
 """How names of shares end."""
+MOST_VALUES = 6
+"""Of one column, in a sentence."""
 SIGNS = {"<=": "≤", ">=": "≥"}
 
 
@@ -91,7 +93,16 @@ def recounted(recount: Recount) -> str:
     rows = f"{where}: {number(recount.whole)} row{'' if recount.whole == 1 else 's'}"
     if recount.part is None:
         return rows
-    return f"{rows}, of them {' and '.join(recount.hits)} in {number(recount.part)}"
+    hits = " and ".join(map(_short, recount.hits))
+    return f"{rows}, of them {hits} in {number(recount.part)}"
+
+
+def _short(said: str) -> str:
+    """A term with the first of many values: the file of the criteria has all."""
+    first, *others = said.split(" or ")
+    if len(others) < MOST_VALUES or said.startswith("not ("):
+        return said
+    return f"{first} or {len(others)} others that criteria.csv lists"
 
 
 def rests_on(counted: str) -> str:

@@ -3,7 +3,8 @@
 import pytest
 from test_verdicts import criterion
 
-from gates.pages.numbers import at_its_end, human, judged_at, limit_said, rests_on
+from gates.pages.numbers import at_its_end, human, judged_at, limit_said, recounted, rests_on
+from gates.report import Recount
 
 
 def of(**changes):
@@ -64,3 +65,28 @@ def test_a_limit_is_said_in_the_unit_of_its_number():
 ])  # fmt: skip
 def test_what_a_number_rests_on(counted, said):
     assert rests_on(counted) == said
+
+
+def recount(**changes):
+    said = {"table": "t", "method": "m", "where": ("a = 1", "b = x"), "columns": ("a", "b"),
+            "of": "", "whole": 1234.0, "hits": (), "summed": (), "part": None}  # fmt: skip
+    return Recount(**{**said, **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "a = 1 and b = x: 1,234 rows"),
+        ({"where": (), "whole": 1.0}, "all rows: 1 row"),
+        ({"hits": ("c = true", "d >= 2"), "part": 0.0},
+         "a = 1 and b = x: 1,234 rows, of them c = true and d >= 2 in 0"),
+        ({"of": "ticks", "summed": ("held",), "part": 12.0},
+         "a = 1 and b = x: ticks adds up to 1,234, held adds up to 12"),
+        ({"of": "ticks", "summed": ("held", "late"), "part": 12.0},
+         "a = 1 and b = x: ticks adds up to 1,234, held and late add up to 12"),
+        ({"hits": ("c = " + " or ".join("abcdefgh"),), "part": 3.0},
+         "a = 1 and b = x: 1,234 rows, of them c = a or 7 others that criteria.csv lists in 3"),
+    ],
+)  # fmt: skip
+def test_a_number_says_how_it_is_counted_again(changes, said):
+    assert recounted(recount(**changes)) == said
