@@ -50,7 +50,7 @@ def _lines(root: Path, papers: Papers) -> list[tuple[str, ...]]:
         days = (card.not_before, card.expires)
         digest = sha256_bytes(statement(root, card))
     needed = (REVIEWER, *OWNERS)
-    found = []
+    found: list[tuple[str, ...]] = []
     for role in needed:
         own = [person for person in signers if person.role == role]
         found += [

@@ -173,7 +173,8 @@ def test_counts_that_do_not_fit_are_left_out_and_not_sampled(whole, judged, monk
     module._split.cache_clear()
     (answer,) = [a for a in judged("D").criteria
                  if (a.id, a.candidate) == ("latency_p95_s", "flow")]  # fmt: skip
-    assert not any(file.folded for file in small.files) and small.recounted(answer) is None
+    assert small.recounted(answer) is None
+    assert all(len(file.data) <= 300 for file in small.files if file.folded)
 
 
 def test_a_row_names_its_rollout_where_the_journal_is_evidence(whole, judged, monkeypatch):
