@@ -83,7 +83,9 @@ def an_average(report: GateReport) -> Iterator[Doubt]:
     for answer in report.criteria:
         found = re.search(rf"{WORST} (\S+) (-\S+ points) over", answer.caveat)
         if found and answer.verdict == "PASS":
-            text = f"it holds for the mean over all conditions; in {found[1]} it is {found[2]}"
+            of = " of utility" if report.settings.get("utility") else ""
+            worst = f"{found[1]} it is {found[2]}{of}"
+            text = f"it holds for the mean over all conditions; in {worst}"
             yield about(report, "an average", answer, text)
 
 

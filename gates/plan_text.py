@@ -19,6 +19,7 @@ def plan_text(plan: Plan) -> str:
         f"margin {plan.margin:g}",
         "",
         *_stated_text(plan),
+        *_weighed_text(plan),
         "",
         "What these starts can show",
     ]
@@ -68,11 +69,23 @@ def _stated_text(plan: Plan) -> list[str]:
         else f"not even by {MOST_STARTS} starts"
     )
     return [
-        f"The stated effect: success {stated.candidate_success:.0%} against "
+        f"The stated effect: {plan.measure} {stated.candidate_success:.0%} against "
         f"{stated.baseline_success:.0%} (stress.planned_effect)",
         f"  found in {stated.promote_share:.0%} of trials with {plan.starts} starts; in "
         f"{plan.power:.0%} {needed}",
     ]
+
+
+def _weighed_text(plan: Plan) -> list[str]:
+    """What is compared where it is not success, and what that does to the power."""
+    if not plan.weighed:
+        return []
+    return _warned(
+        f"Compared is utility: a success less {plan.weighed}, each as a share of the longest "
+        "rollout; all else is 0. Margin, effect and gains are of utility, and outcomes are taken "
+        "as 0 or 1, the hardest of their means. Is the effect one of success, and costs every "
+        f"success all that it can, it is found in {plan.stated.dearest_share:.0%}."
+    )
 
 
 def _gain_text(gain: Gain) -> str:

@@ -20,13 +20,14 @@ from gates.stated import section
 from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from gates.stress.trial import reachable
+from gates.stress.weights import by_cost, listed
 from gates.verdicts import judge_criterion, rounded
 from genpolicy.evidence.documents.stress import Power
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
 from genpolicy.seeds import stream
-from genpolicy.statistics.eprocess import paired_e_value, power_table, simulate_pairs
+from genpolicy.statistics.eprocess import Array, paired_e_value, power_table, simulate_pairs
 
 FEWER = ("intervention_upper", "reset_upper")
 """Criteria of which a rollout is hit or not, and hits are bad: bounded from above."""
@@ -83,17 +84,20 @@ class Stated:
     """The effect for which the trial is planned, and whether it is found.
 
     Attributes:
-        baseline_success: Success of the best baseline, as `stress.planned_effect` says.
-        candidate_success: Success of a candidate worth promoting.
+        baseline_success: What the best baseline is worth, as `stress.planned_effect` says.
+        candidate_success: What a candidate is that is worth promoting.
         promote_share: How often such a candidate is promoted, of the simulated trials.
         starts_needed: Starts from which it is promoted as often as is asked; None: not with as
             many as are tried.
+        dearest_share: How often it is promoted if these are shares of successes, each of which
+            costs all that weights take; None where nothing is weighed.
     """
 
     baseline_success: float
     candidate_success: float
     promote_share: float
     starts_needed: int | None
+    dearest_share: float | None
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,9 @@ class Plan:
         probe_rollouts: After it, under probes and without, for the stage `monitors`,
             if every registered candidate is admitted.
         longest_s: Virtual time if each of all these rollouts took its limit, s.
-        margin: Gain to be shown.
+        measure: What is compared: success, or utility where costs are weighed.
+        weighed: Costs and weights; empty where success is compared.
+        margin: Gain to be shown, in what is compared.
         alpha: Chance of a wrong promotion of one candidate.
         power: Share of trials in which a gain is to be found.
         stated: The effect that the plan is for.
@@ -126,6 +132,8 @@ class Plan:
     graded_rollouts: int
     probe_rollouts: int
     longest_s: float
+    measure: str
+    weighed: str
     margin: float
     alpha: float
     power: float
@@ -177,6 +185,8 @@ def plan_of(root: Path) -> Plan:
         graded_rollouts=graded,
         probe_rollouts=probed,
         longest_s=(rollouts + graded + probed) * planned.episode_limit_s,
+        measure=settings.measure,
+        weighed=listed(settings.utility),
         margin=settings.margin,
         alpha=settings.alpha,
         power=power,
@@ -263,7 +273,20 @@ def _stated(settings: StressSettings, table: Power, power: float) -> Stated:
         candidate_success=candidate,
         promote_share=shares[settings.planned_effect],
         starts_needed=enough if enough <= MOST_STARTS else None,
+        dearest_share=_dearest(trials, settings),
     )
+
+
+def _dearest(trials: Array, settings: StressSettings) -> float | None:
+    """Power where every success, of whomever, costs all that the weights can take from it."""
+    if not settings.utility:
+        return None
+    kept = 1.0 - sum(by_cost(settings.utility).values())
+    tests = [
+        paired_e_value(kept * pairs, margin=settings.margin, alpha=settings.alpha)
+        for pairs in trials[:, : settings.planned_starts]
+    ]
+    return sum(test.decision == "promote" for test in tests) / len(tests)
 
 
 def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:

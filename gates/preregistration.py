@@ -69,6 +69,9 @@ PLANNED: Mapping[str, Planned] = {
     "gate_d.tolerances": Planned("", "D"),
 }
 """What the plan names beside limits."""
+IF_STATED: Mapping[str, Planned] = {"gate_d.utility": Planned("", "D")}
+"""What it names only where it is stated: without weights success is compared, as in every plan that
+is older than they are."""
 SECTIONS: Mapping[str, Gate] = {"feasibility": "A", "execution": "C"}
 """Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
 SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
@@ -177,13 +180,14 @@ def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[
 def _now(params: Mapping[str, Any]) -> dict[str, Any]:
     """All that a plan names, by its place."""
     planned = {place: at(params, place) for place in PLANNED}
+    planned |= {place: found for place in IF_STATED if (found := at(params, place))}
     return {**planned, **_all_settings(params), **_all_limits(params)}
 
 
 def _side(place: str) -> str:
     """On which side a setting is strict; '' where neither is."""
-    if place in PLANNED:
-        return PLANNED[place].strict
+    if stated := {**PLANNED, **IF_STATED}.get(place):
+        return stated.strict
     section, _, name = place.partition(".")
     if section in SECTIONS:
         return _strict(place)
@@ -194,8 +198,8 @@ def _side(place: str) -> str:
 
 def asked_by(place: str) -> Gate:
     """The lowest gate that a setting of the plan matters to; the first for what nobody knows."""
-    if place in PLANNED:
-        return PLANNED[place].gate
+    if stated := {**PLANNED, **IF_STATED}.get(place):
+        return stated.gate
     section = place.partition(".")[0]
     return next((gate for gate in GATES if stage_of(gate) == section), SECTIONS.get(section, "A"))
 
@@ -263,7 +267,7 @@ def _is_number(value: object) -> bool:
 
 def _of_section(place: str, kind: Kind) -> Kind:
     """Of a limit the kind; a setting that came or went has a default on no known side."""
-    return "changed" if place.partition(".")[0] in SECTIONS else kind
+    return "changed" if place.partition(".")[0] in SECTIONS or place in IF_STATED else kind
 
 
 def _strict(place: str) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from benchmarks.decision import tables
-from benchmarks.decision.catalogue import MARGIN, WORLDS
+from benchmarks.decision.catalogue import GRADED, MARGIN, WORLDS
 from benchmarks.decision.rule import counted, names, told
 from benchmarks.decision.whole import judged
 from benchmarks.decision.worlds import CONDITIONS, World, draw
@@ -30,6 +30,7 @@ from gates.report import stage_of
 from gates.settings import Limits, read_limits, read_params, read_settings
 from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
+from gates.stress.weights import DURATION, LEAST_OF_A_SUCCESS
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import power_document
 from genpolicy.integrity.documents import canonical_json
@@ -51,6 +52,10 @@ WHOLE = (
     World("no_gain", ".8 against .8", ("promoted",), (0.8, 0.2), (0.8,)),
     World("none_inside", ".9 against .5, and .5 inside the envelope", ("promoted",), (0.5, 0.2),
           (0.9,), tilt=(("envelope", -0.4),)),
+    World("graded_cheaper", "as many successes each, of utility .5 and .8", ("promoted",),
+          (0.5, 0.2), (0.8,), lost=(0.5, 0.2)),
+    World("graded_no_gain", "the same, of .5 and .5", ("promoted",), (0.5, 0.2), (0.5,),
+          lost=(0.5, 0.5)),
 )  # fmt: skip
 
 
@@ -58,6 +63,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.decision", description=__doc__)
     parser.add_argument("--trials", type=int, default=10_000, help="of the rule, in each world")
+    parser.add_argument("--graded", type=int, default=400, help="of it where outcomes are graded")
     parser.add_argument("--whole", type=int, default=20, help="of the whole gate, in each world")
     parser.add_argument("--only", action="append", default=[], help="name of a world")
     parser.add_argument("--out", type=Path, default=Path("build/decision"))
@@ -83,9 +89,15 @@ def planned(root: Path) -> tuple[StressSettings, Limits, StressSection]:
 def of_world(settings: StressSettings, world: World) -> StressSettings:
     """The settings with the methods of a world, each candidate at its share of the alpha."""
     simple = tuple(f"simple_{number}" for number in range(len(world.baselines)))
+    weighed = {"model": {DURATION: (1.0 - LEAST_OF_A_SUCCESS, "all that a success may lose")}}
     family = settings.family_alpha * len(world.candidates) / world.registered
     return settings.model_copy(
-        update={"baselines": simple, "candidates": names(world), "family_alpha": family}
+        update={
+            "baselines": simple,
+            "candidates": names(world),
+            "family_alpha": family,
+            "utility": weighed if world.lost else {},
+        }
     )
 
 
@@ -141,9 +153,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     wanted = [world for world in WORLDS if not args.only or world.name in args.only]
     code = code_of(ROOT)
     results = {
-        world.name: kept(args.out / f"rule_{world.name}.json", args.trials,
+        world.name: kept(args.out / f"rule_{world.name}.json", trials_of(world, args),
                          hash_of(code, world, settings),
-                         lambda w=world: rule_alone(w, settings, args.trials))
+                         lambda w=world: rule_alone(w, settings, trials_of(w, args)))
         for world in wanted
     }  # fmt: skip
     gates = [
@@ -152,7 +164,10 @@ def main(argv: Sequence[str] | None = None) -> int:
              lambda w=world: whole_gate(w, settings, limits, section, args.whole))
         for world in WHOLE if args.whole and (not args.only or world.name in args.only)
     ]  # fmt: skip
-    texts = {"promotion": tables.promotion(results), "whole": tables.whole(gates)}
+    texts = {
+        "promotion": tables.promotion(results), "graded": tables.graded(results),
+        "whole": tables.whole(gates),
+    }  # fmt: skip
     print("\n".join(texts.values()))
     if args.docs:
         page = args.docs.read_text()
@@ -160,10 +175,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             page = tables.into_page(page, name, text)
         args.docs.write_text(page)
     held = (
-        tables.kept(world, results[world.name]["hits"][world.asks[0]], args.trials)
+        tables.kept(world, results[world.name]["hits"][world.asks[0]], trials_of(world, args))
         for world in wanted
     )
     return 1 if any(answer is False for answer in held) else 0
+
+
+def trials_of(world: World, args: argparse.Namespace) -> int:
+    """How many trials of a world are asked for."""
+    return args.graded if world in GRADED else args.trials
 
 
 def code_of(root: Path) -> str:

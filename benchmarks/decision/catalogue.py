@@ -45,6 +45,22 @@ NULLS = (
 )  # fmt: skip
 """False promotion at most 5 %, at the worse end of the interval."""
 
+GRADED = (
+    _null("graded", "utility: both lose .2 of a success to costs; peeking", (0.5, 0.2),
+          lost=(0.2, 0.2), peeking=10),
+    _null("graded_cheap", "as many successes each, worth .5 and .55: all of the gain is in costs; "
+          "peeking", (0.5, 0.2), lost=(0.5, 0.45), peeking=10),
+    _null("graded_dear", "utility: it always succeeds, at all costs; peeking", (0.45, 0.2),
+          lost=(0.0, 0.5), peeking=10),
+    _null("graded_tied", "the first, all conditions of a start alike", (0.5, 0.2), lost=(0.2, 0.2),
+          peeking=10, conditions_alike=ALL_ALIKE),
+    _null("graded_spread", "the first, training seeds differ by sd .15; 3 run", (0.5, 0.2),
+          lost=(0.2, 0.2), peeking=10, spread=0.15, seeds=3),
+    World("graded_planned", "the planned effect of utility: .8 against .5, both lose .2",
+          ("promoted",), (0.5, 0.2), (0.8,), conditions_alike=ALL_ALIKE, lost=(0.2, 0.2)),
+)  # fmt: skip
+"""Outcomes between 0 and 1. False promotion at most 5 %; power is shown beside it."""
+
 POWERS = (
     World("planned", "the planned effect: .8 against .5, all conditions of a start alike",
           ("promoted",), (0.5, 0.2), (0.8,), least=0.8, conditions_alike=ALL_ALIKE),
@@ -63,4 +79,4 @@ POWERS = (
     World("two_alike", "two alike, .8 and .8", ("either",), (0.5, 0.2), (0.8, 0.8)),
 )  # fmt: skip
 """What is found, and who is chosen."""
-WORLDS = (*NULLS, *POWERS)
+WORLDS = (*NULLS, *POWERS, *GRADED)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.decision.catalogue import NULLS, POWERS
+from benchmarks.decision.catalogue import GRADED, NULLS, POWERS
 from benchmarks.decision.rule import COUNTS
 from benchmarks.decision.worlds import World
 from genpolicy.statistics.intervals import clopper_pearson
@@ -36,10 +36,23 @@ def kept(world: World, hits: int, trials: int) -> bool | None:
 
 def promotion(results: Mapping[str, Mapping[str, Any]]) -> str:
     """Tables of the promotion rule alone."""
-    parts = [
-        ("False promotion: at most 5 %", NULLS),
-        ("Power, and who is chosen of several", POWERS),
-    ]
+    return _tables(
+        results,
+        [
+            ("False promotion: at most 5 %", NULLS),
+            ("Power, and who is chosen of several", POWERS),
+        ],
+    )
+
+
+def graded(results: Mapping[str, Mapping[str, Any]]) -> str:
+    """The same where outcomes are graded."""
+    return _tables(results, [("Graded outcomes: false promotion at most 5 %, and power", GRADED)])
+
+
+def _tables(
+    results: Mapping[str, Mapping[str, Any]], parts: Sequence[tuple[str, Sequence[World]]]
+) -> str:
     lines: list[str] = []
     for title, worlds in parts:
         lines += [f"**{title}**", "", "| world | counted | trials | share | 95 % interval | kept |"]

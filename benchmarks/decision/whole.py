@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from benchmarks.decision.worlds import CONDITIONS, Array, Drawn
 from gates.engine import judge
@@ -20,12 +19,14 @@ from gates.pipeline import TASK_IDENTITY
 from gates.report import GateReport
 from gates.settings import Limits
 from gates.stress.gate import GATE
+from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import INVOCATIONS, JOURNALS, ROLLOUTS, STRESS, StressSettings
+from gates.stress.weights import DURATION, LEAST_OF_A_SUCCESS, by_cost
 from genpolicy.evidence.documents.stress import POWER
 from genpolicy.integrity.documents import canonical_json
 
-TICKS, ASKED = 160, 20
-"""Ticks of a rollout, and invocations in it."""
+TICKS, ASKED, LASTED_S = 160, 20, 8.0
+"""Ticks of a rollout, invocations in it, and how long it lasts."""
 
 
 class Tables(Evidence):
@@ -72,15 +73,16 @@ def _tables(
     drawn: Drawn, settings: StressSettings, rng: np.random.Generator
 ) -> dict[str, pa.Table]:
     methods = (*settings.baselines, *settings.candidates)
-    won = np.concatenate([drawn.baselines, drawn.candidates]) > 0.5
-    if not np.array_equal(won, np.concatenate([drawn.baselines, drawn.candidates])):
+    worth = np.concatenate([drawn.baselines, drawn.candidates])
+    if not np.isin(worth, (0.0, LEAST_OF_A_SUCCESS, 1.0) if settings.utility else (0.0, 1.0)).all():
         raise ValueError("the whole rule is asked of one checkpoint of each candidate")
-    rows = _rollouts(methods, won, rng)
+    rows = _rollouts(methods, worth, settings, rng)
     judged_rows = rows[rows["method"].isin(settings.candidates)]
     cells = pd.MultiIndex.from_product([methods, CONDITIONS], names=["method", "perturbation"])
     frame = cells.to_frame(index=False)
     tables = {
         ROLLOUTS: rows,
+        RECOVERIES: _recoveries(rows),
         INVOCATIONS: _invocations(judged_rows, rng),
         f"{STRESS}/stub.parquet": frame.assign(arrivals=500, stale=0, invalid=0),
         f"{STRESS}/counts.parquet": frame.assign(reason="expired", count=10),
@@ -94,10 +96,18 @@ def _tables(
 
 
 def _rollouts(
-    methods: tuple[str, ...], won: NDArray[np.bool_], rng: np.random.Generator
+    methods: tuple[str, ...], worth: Array, settings: StressSettings, rng: np.random.Generator
 ) -> pd.DataFrame:
-    """Outcomes as drawn; costs of a sound policy: few misses, holds, rejections and stops."""
-    starts = won.shape[2]
+    """Outcomes as drawn; costs of a sound policy: few misses, holds, rejections and stops.
+
+    Where duration is weighed, a success takes as long as its worth says.
+    """
+    starts, won = worth.shape[2], worth > 0.0
+    weight = by_cost(settings.utility).get(DURATION)
+    lasted = np.full(worth.size, LASTED_S)
+    if weight is not None:
+        lost = np.where(won, 1.0 - worth, 0.0).reshape(-1)
+        lasted = settings.longest_s * lost / weight
     index = pd.MultiIndex.from_product(
         [methods, CONDITIONS, range(starts)], names=["method", "perturbation", "start"]
     )
@@ -110,7 +120,7 @@ def _rollouts(
     return rows.assign(
         seed=0,
         start_sha256=[f"{c}{s}" for c, s in zip(rows["perturbation"], rows["start"], strict=True)],
-        outcome=ends, success=success, duration_s=8.0, ticks=TICKS,
+        outcome=ends, success=success, duration_s=lasted, ticks=TICKS,
         action_ticks=TICKS - hold - fallback, hold_ticks=hold, fallback_ticks=fallback,
         invocations=ASKED, deadline_misses=rng.binomial(ASKED, MISSED, n), discards=1,
         rejections=rng.binomial(ASKED, REJECTED, n), rejected_by="",
@@ -118,6 +128,17 @@ def _rollouts(
         interventions=(rng.random(n) < CALLED).astype(np.int64), action_age_p50_s=0.1,
         action_age_p95_s=0.2, action_age_max_s=0.3, latency_p95_s=0.1,
         force_peak_n=20.0 * np.exp(0.3 * rng.standard_normal(n)), mode="left",
+    )  # fmt: skip
+
+
+def _recoveries(rows: pd.DataFrame) -> pd.DataFrame:
+    """One entry of each rollout that is drilled, which ended as the rollout says."""
+    keys = ["method", "seed", "perturbation", "start", "success", "recovered"]
+    begun = rows[rows["recovery_attempted"]][keys].rename(columns={"success": "succeeded"})
+    return begun.assign(
+        recovery=0, phase="approach", cause="drill", primitives="retreat", failures=0,
+        ended=np.where(begun["recovered"], "handed_back", "timed_out"), resampled_only=False,
+        taken_over=begun["recovered"], duration_s=1.0, force_peak_n=0.0, resets=0,
     )  # fmt: skip
 
 

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.report import Gate, GateReport
-from gates.stress.rollouts import ROLLOUTS
-from genpolicy.errors import IntegrityError
+from gates.report import Gate, GateReport, parse_section
+from gates.stress.rollouts import ROLLOUTS, StressSettings
+from gates.stress.utility import utilities
+from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.evidence.rows.stress import RolloutRow
 
 TRAINED = "artifacts/train_baselines"
 WEIGHTS = "model.safetensors"
+SETTINGS = "reports/gate_d.json: settings"
 
 
 @dataclass(frozen=True)
@@ -22,24 +24,30 @@ class Rollback:
         checkpoint_sha256: Of the weights of its first seed, as gate A's report names them.
         succeeded: Rollouts of the comparison in which it succeeded.
         rollouts: Of how many, all planned conditions together.
+        utility: What they were worth on average; None where success alone is compared.
     """
 
     policy: str
     checkpoint_sha256: str
     succeeded: int
     rollouts: int
+    utility: float | None = None
 
     @property
     def text(self) -> str:
         """As a card says it."""
+        worth = "" if self.utility is None else f" at a mean utility of {self.utility:.4g}"
         return (
             f"stop, then {self.policy} (checkpoint {self.checkpoint_sha256}), which succeeded in "
-            f"{self.succeeded} of {self.rollouts} rollouts on the same starts, or manual control"
+            f"{self.succeeded} of {self.rollouts} rollouts{worth} on the same starts, or manual "
+            "control"
         )
 
 
 def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollback:
-    """The simple method with the most successes over all planned conditions; of equals the first.
+    """The simple method that is worth most over all planned conditions; of equals the first.
+
+    Success, or utility where Gate D compared that: the best one is the same there and here.
 
     Args:
         reports: Of gates A and D at least.
@@ -48,19 +56,21 @@ def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollb
     Raises:
         IntegrityError: No simple method rolled out, or gate A's report names no weights of it.
     """
-    settings = reports["D"].settings
     try:
+        settings = parse_section(StressSettings, reports["D"].settings, where=SETTINGS)
         rows = evidence.rows(ROLLOUTS, RolloutRow)
-        rows = rows[rows["perturbation"].isin(settings["perturbations"])]
-        tried = {
-            name: flags(rows[rows["method"] == name], "success") for name in settings["baselines"]
+        rows = rows[rows["perturbation"].isin(settings.perturbations)]
+        tried = {name: rows[rows["method"] == name] for name in settings.baselines}
+        worth = {
+            name: float(utilities(evidence, settings, name, of).mean())
+            for name, of in tried.items()
+            if len(of)
         }
-    except MissingEvidenceError as error:
+    except (MissingEvidenceError, ConfigError) as error:
         raise _unknown(ROLLOUTS, str(error), "rollouts of the simple methods") from error
-    shares = {name: float(found.mean()) for name, found in tried.items() if len(found)}
-    if not shares:
+    if not worth:
         raise _unknown(ROLLOUTS, "no rollout of a simple method", "the comparison of gate D")
-    best = max(shares, key=lambda name: shares[name])
+    best = max(worth, key=lambda name: worth[name])
     weights = sorted(
         (path, digest)
         for path, digest in reports["A"].materials.items()
@@ -68,7 +78,9 @@ def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollb
     )
     if not weights:
         raise _unknown("reports/gate_a.json: materials", f"no weights of {best}", "their hash")
-    return Rollback(best, weights[0][1], int(tried[best].sum()), len(tried[best]))
+    won = flags(tried[best], "success")
+    utility = worth[best] if settings.utility else None
+    return Rollback(best, weights[0][1], int(won.sum()), len(won), utility)
 
 
 def require_rollback(text: str, reports: Mapping[Gate, GateReport], evidence: Evidence) -> None:

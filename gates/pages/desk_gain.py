@@ -10,7 +10,10 @@ from gates.pages.bound import require_bound
 from gates.report import Gate, GateReport
 from gates.stress.gate import best_baseline
 from gates.stress.pairs import paired_differences
+from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import ROLLOUTS, StressSettings, rollouts
+from gates.stress.utility import utilities
+from gates.stress.weights import RECOVERY, by_cost, listed
 from genpolicy.statistics.eprocess import gain_interval
 
 
@@ -26,6 +29,8 @@ def gain_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> str:
     try:
         settings = StressSettings.model_validate(report.settings, strict=False)
         require_bound(evidence, report, ROLLOUTS)
+        if RECOVERY in by_cost(settings.utility):
+            require_bound(evidence, report, RECOVERIES)
         return _said(report.promoted, evidence, settings)
     except (MissingEvidenceError, ValidationError):
         return ""
@@ -36,13 +41,28 @@ def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
     differences = paired_differences(evidence, settings, promoted, best)
     # As the promotion is tested, so that a gain that it shows is one that stands here.
     low, high = gain_interval(differences, alpha=settings.alpha)
+    by, worth, of = "", "", ""
+    if settings.utility:
+        means = [_worth(evidence, settings, method) for method in (promoted, best)]
+        by, of = " by utility", " of utility"
+        worth = (
+            f". As utility, a success less {listed(settings.utility)}, that is worth "
+            f"{means[0]:.3g} against {means[1]:.3g}"
+        )
     return (
-        f"{promoted} succeeds in {_share(evidence, settings, promoted)}, the best simple policy, "
-        f"{best}, in {_share(evidence, settings, best)}: {_points(differences.mean())} points on "
+        f"{promoted} succeeds in {_share(evidence, settings, promoted)}, the best simple policy"
+        f"{by}, {best}, in {_share(evidence, settings, best)}{worth}: "
+        f"{_points(differences.mean())} points{of} on "
         f"the same {len(differences)} starts in {len(settings.perturbations)} conditions, between "
         f"{_points(low)} and {_points(high)} (each end wrong with at most "
         f"{100 * settings.alpha:.3g} %); more than {_points(settings.margin)} had to be shown."
     )
+
+
+def _worth(evidence: Evidence, settings: StressSettings, method: str) -> float:
+    """Mean utility of the rollouts of a method."""
+    rows = rollouts(evidence, settings, method)
+    return float(utilities(evidence, settings, method, rows).mean())
 
 
 def _share(evidence: Evidence, settings: StressSettings, method: str) -> str:

@@ -30,7 +30,7 @@ class Comparison:
     Attributes:
         better: The one.
         other: The other.
-        e_value: Evidence that the mean success of `better` is the higher one.
+        e_value: Evidence that `better` is worth more on average, in what is compared.
         gain: Mean difference over the starts.
     """
 
@@ -106,7 +106,7 @@ def ranked(
     text = (
         f"promote either of {', '.join(left)}, {IN_SHORT}{better}: no paired test "
         f"tells them apart (an e-value of {most.e_value:.3g} that {most.better} is better than "
-        f"{most.other} by {points(most.gain)}; "
+        f"{most.other} by {points(most.gain)} of {settings.measure}; "
         f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
     )
     return Decision(text, promoted=for_the_card)

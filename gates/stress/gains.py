@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gates.evidence import Array, Evidence
-from gates.stress.pairs import paired_by_condition
+from gates.stress.pairs import paired_by_condition, paired_differences
 from gates.stress.rollouts import ENVELOPE, StressSettings
 from gates.words import points
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
@@ -28,6 +28,7 @@ class Inside:
         e_value: Evidence that there is a gain.
         shown: Whether one is shown, over every baseline.
         worse: Whether over this baseline it is shown to be a loss.
+        measure: What is compared, success or utility.
     """
 
     baseline: str
@@ -36,6 +37,7 @@ class Inside:
     e_value: float
     shown: bool
     worse: bool
+    measure: str
 
     @property
     def gain(self) -> float:
@@ -55,8 +57,8 @@ class Inside:
     def __str__(self) -> str:
         low, high = self.interval
         return (
-            f"inside the envelope {points(self.gain)} over {self.baseline} on {self.starts} "
-            f"starts, between {points(low)} and {points(high)}"
+            f"inside the envelope {points(self.gain)} of {self.measure} over {self.baseline} on "
+            f"{self.starts} starts, between {points(low)} and {points(high)}"
         )
 
 
@@ -97,7 +99,20 @@ def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -
         f"{condition} {points(gain)} over {baseline}"
         for (gain, baseline), condition in sorted((gain, name) for name, gain in least.items())
     )
-    return f"on {settings.planned_starts} starts in each condition, {WORST} {told}"
+    return (
+        f"{settings.measure} on {settings.planned_starts} starts in each condition, {WORST} {told}"
+    )
+
+
+def in_success(evidence: Evidence, settings: StressSettings, candidate: str, baseline: str) -> str:
+    """The gain in success alone over a baseline, where utility is what is compared."""
+    alone = settings.model_copy(update={"utility": {}})
+    differences = paired_differences(evidence, alone, candidate, baseline)
+    low, high = gain_interval(differences, alpha=settings.alpha)
+    gain = round(float(differences.mean()), 12) + 0.0
+    return (
+        f"in success alone {points(gain)} over {baseline}, between {points(low)} and {points(high)}"
+    )
 
 
 def inside_envelope(evidence: Evidence, settings: StressSettings, candidate: str) -> Inside | None:
@@ -139,6 +154,7 @@ def inside_pairs(differences: Mapping[str, Array], settings: StressSettings) -> 
         e_value=tests[baseline].e_value,
         shown=shown,
         worse=not shown and loss.decision == "promote",
+        measure=settings.measure,
     )
 
 

@@ -6,22 +6,22 @@ training seeds of one start are averaged for the gain: the start is the unit of 
 Inside the envelope of the card there must be a gain at all.
 """
 
-import numpy as np
-
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
-from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.overrides import OVERRIDES
 from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.clocks import clocks_said
 from gates.stress.contact import contact_said
-from gates.stress.gains import by_condition, inside_envelope, least_gain
+from gates.stress.gains import by_condition, in_success, inside_envelope, least_gain
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
+from gates.stress.utility import utilities
+from gates.stress.weights import listed
 from gates.words import points
 
 
@@ -47,10 +47,16 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     inside = inside_envelope(evidence, settings, candidate)
     least = least_gain(differences, inside, settings)
     text = (
-        f"lowest over baselines, against {least.baseline}: mean gain {points(least.gain)} over "
-        f"{settings.planned_starts} starts, margin {points(settings.margin)}; "
+        f"lowest over baselines, against {least.baseline}: mean gain in {settings.measure} "
+        f"{points(least.gain)} over {settings.planned_starts} starts, margin "
+        f"{points(settings.margin)}; "
         f"{by_condition(evidence, settings, candidate)}"
     )
+    if settings.utility:
+        text = (
+            f"{text}; {in_success(evidence, settings, candidate, least.baseline)}; utility is a "
+            f"success less {listed(settings.utility)}"
+        )
     text = f"{text}; {inside or 'no condition inside the envelope of a card was planned'}"
     if inside and least.measured is None:
         raise MissingEvidenceError(
@@ -61,14 +67,15 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
 
 
 def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
-    """The simple method with the highest success over all planned conditions.
+    """The simple method that is worth most over all planned conditions, as pairs are compared.
 
     Raises:
         MissingEvidenceError: A baseline was not run under every condition, as often as planned.
     """
+    rows = {method: rollouts(evidence, settings, method) for method in settings.baselines}
     means = {
-        method: float(np.mean(flags(rollouts(evidence, settings, method), "success")))
-        for method in settings.baselines
+        method: float(utilities(evidence, settings, method, of).mean())
+        for method, of in rows.items()
     }
     return max(means, key=lambda name: means[name])  # of equals the one that is named first
 

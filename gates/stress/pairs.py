@@ -1,22 +1,24 @@
-"""Pairs of the trial: success of two methods on the same start."""
+"""Pairs of the trial: what two methods are worth on the same start."""
 
 import numpy as np
 import pandas as pd
 
-from gates.evidence import Array, Evidence, MissingEvidenceError, flags
+from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.stress.rollouts import StressSettings, rollouts
+from gates.stress.utility import utilities
 
 
 def paired_differences(
     evidence: Evidence, settings: StressSettings, method: str, baseline: str
 ) -> Array:
-    """Success of `method` minus that of `baseline`, per start. Shape (planned_starts,).
+    """What `method` is worth minus what `baseline` is, per start. Shape (planned_starts,).
 
+    Success, or utility where costs are weighed (`StressSettings.measure`).
     All conditions and seeds of a start are one draw, so that the pairs are independent.
     """
     own, other = (
-        success_by_start(evidence, settings, method),
-        success_by_start(evidence, settings, baseline),
+        worth_by_start(evidence, settings, method),
+        worth_by_start(evidence, settings, baseline),
     )
     common = own.index.intersection(other.index)[: settings.planned_starts]
     if len(common) < settings.planned_starts:
@@ -47,10 +49,8 @@ def paired_by_condition(
     return found
 
 
-def success_by_start(
-    evidence: Evidence, settings: StressSettings, method: str
-) -> "pd.Series[float]":
-    """Mean success of a method per start, over conditions and training seeds, in start order."""
+def worth_by_start(evidence: Evidence, settings: StressSettings, method: str) -> "pd.Series[float]":
+    """What a method is worth per start, over conditions and training seeds, in start order."""
     means = _by_start_and_condition(evidence, settings, method)
     return means.groupby("start").mean().sort_index()
 
@@ -58,7 +58,7 @@ def success_by_start(
 def _by_start_and_condition(
     evidence: Evidence, settings: StressSettings, method: str
 ) -> "pd.Series[float]":
-    """Mean success over training seeds, by start and condition."""
+    """Mean over training seeds, by start and condition."""
     rows = rollouts(evidence, settings, method)
-    rows = rows.assign(success=flags(rows, "success").astype(np.float64))
-    return rows.groupby(["start", "perturbation"])["success"].mean()
+    rows = rows.assign(worth=utilities(evidence, settings, method, rows))
+    return rows.groupby(["start", "perturbation"])["worth"].mean()

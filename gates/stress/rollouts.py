@@ -1,10 +1,10 @@
 """Rollouts of the matched comparison, and the settings of Gate D that say which must be there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import pandas as pd
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from gates.again import CHANGED
 from gates.bounds import share_interval
@@ -13,6 +13,7 @@ from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.recount import Subset, is_one
 from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
+from gates.stress.weights import Weights, explained, require_weights
 from gates.words import percent, share_of
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
@@ -45,16 +46,19 @@ class StressSettings(CandidateSettings):
     Attributes:
         baselines: Simpler methods; a candidate must beat each of them.
         perturbations: Conditions that every method must have met; `nominal` is one.
-        margin: Gain in success share to be shown.
+        margin: Gain to be shown, in what is compared (`measure`).
         family_alpha: Probability of any wrong promotion.
         planned_starts: Starts planned; fewer recorded ones leave the gate without a verdict.
-        planned_effect: Success of baseline and candidate that the test must be able to tell apart.
+        planned_effect: What baseline and candidate are worth, success or utility, that the test
+            must be able to tell apart.
+        episode_limit_s: Longest rollout, s.
         execution_horizon: Actions of a chunk that may be executed.
         action_period_s: Period of the actions, s.
         maximum_age_s: Oldest action that may be executed, s; by phase where phases differ.
         unmatched: Candidates that are compared by exception; none is ranked among the others.
         tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
         monitor_costs: By owner: what a cell of the monitors' cost matrix costs, and why; likewise.
+        utility: By owner: what a success loses by a cost, and why; without any success is compared.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -65,6 +69,7 @@ class StressSettings(CandidateSettings):
         "family_alpha": "stress.alpha",
         "planned_starts": "stress.starts",
         "planned_effect": "stress.planned_effect",
+        "episode_limit_s": "stress.episode_limit_s",
         "execution_horizon": "horizons.execution_horizon",
         "action_period_s": "horizons.action_period_s",
         "maximum_age_s": "execution.maximum_age_s",
@@ -79,12 +84,14 @@ class StressSettings(CandidateSettings):
     family_alpha: float = Field(gt=0.0, lt=1.0)
     planned_starts: int = Field(gt=0)
     planned_effect: tuple[float, float]
+    episode_limit_s: float = Field(gt=0.0)
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
     maximum_age_s: float | dict[str, float]
     unmatched: tuple[str, ...] = ()
     tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
     monitor_costs: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
+    utility: Annotated[Weights, AfterValidator(require_weights)] = Field(default_factory=dict)
 
     def tolerance(self, name: str) -> float | None:
         """What the clocks may differ by in one respect; None where nobody has said."""
@@ -100,12 +107,23 @@ class StressSettings(CandidateSettings):
 
     @property
     def caveats(self) -> tuple[str, ...]:
-        """Whose gain may be one of its training, and not of its method."""
-        return tuple(
+        """What is compared, if not success; whose gain may be one of its training."""
+        weighed = (explained(self.utility, self.longest_s),) if self.utility else ()
+        return weighed + tuple(
             f"{name} is unmatched evidence: a gain of it may be one of other data or a longer "
             "training. It is ranked with nobody."
             for name in sorted(self.unmatched)
         )
+
+    @property
+    def measure(self) -> str:
+        """What is compared: `success`, or `utility` where costs are weighed."""
+        return "utility" if self.utility else "success"
+
+    @property
+    def longest_s(self) -> float:
+        """How long a rollout can be, s: whole periods, as the comparison counts them."""
+        return round(self.episode_limit_s / self.action_period_s) * self.action_period_s
 
     @property
     def usable_s(self) -> float:

@@ -93,7 +93,7 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     back = min(row.return_share for row in without.values())
     baseline, candidate = settings.planned_effect
     text = (
-        f"success of {percent(candidate)} against {percent(baseline)} is promoted in "
+        f"{settings.measure} of {percent(candidate)} against {percent(baseline)} is promoted in "
         f"{percent(promote)} of simulated trials; a gain of at most the margin is returned in "
         f"{percent(back)}"
     )

@@ -231,6 +231,7 @@ PARAMS: dict[str, Any] = {
         "alpha": 0.1,
         "samples": 4,
         "planned_effect": [0.5, 0.95],
+        "episode_limit_s": 12.0,
     },
     "gate_a": {
         "cause": _cause(),

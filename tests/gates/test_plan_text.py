@@ -4,12 +4,13 @@ from gates.plan_text import plan_text
 from gates.planning import Bound, Gain, Plan, Stated
 
 
-def made(*bounds, gains=(), needed=77, graded=0, probed=0):
+def made(*bounds, gains=(), needed=77, graded=0, probed=0, weighed=""):
     return Plan(
         starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
         rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed, longest_s=63_000.0,
-        margin=0.05, alpha=0.0125, power=0.8,
-        stated=Stated(0.5, 0.8, 0.86, needed), bounds=bounds, gains=gains,
+        measure="utility" if weighed else "success", weighed=weighed, margin=0.05, alpha=0.0125,
+        power=0.8, stated=Stated(0.5, 0.8, 0.86, needed, 0.4 if weighed else None), bounds=bounds,
+        gains=gains,
     )  # fmt: skip
 
 
@@ -70,3 +71,12 @@ def test_a_broken_test_is_a_fail_and_no_question_of_more_starts():
     both = plan_text(made(broken, Bound("cost", False, "y")))
     assert "INCONCLUSIVE" not in both
     assert "Not to be shown either: cost. Plan more starts" in both
+
+
+def test_what_is_compared_is_said_where_it_is_not_success():
+    lines = plan_text(made(weighed="duration 0.2, fallback 0.1")).splitlines()
+    assert lines[4] == "The stated effect: utility 80% against 50% (stress.planned_effect)"
+    said = " ".join(lines[7:12])
+    assert said.startswith("Compared is utility: a success less duration 0.2, fallback 0.1, each")
+    assert "it is found in 40%." in said
+    assert "utility" not in plan_text(made())

@@ -344,3 +344,22 @@ def test_a_limit_at_the_bound_itself_is_kept(name):
     at, step = (high, -1e-9) if name == "intervention_upper" else (low, 1e-9)
     assert " 3 " in _counted(name, at, 30, 0.95).says
     assert " 3 " not in _counted(name, at + step, 30, 0.95).says
+
+
+def test_a_plan_of_utility_says_so_and_what_costs_may_leave_of_its_power(tmp_path, monkeypatch):
+    monkeypatch.setattr(planning, "POWER_TRIALS", TRIALS)
+
+    def plan(weight):
+        params = read_params(ROOT)
+        weights = {"model": {"duration": [weight, "the line waits"]}} if weight else {}
+        params = {**params, "gate_d": {**params["gate_d"], "utility": weights}}
+        (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
+        return plan_of(tmp_path)
+
+    plain, light, heavy = (plan(weight) for weight in (0.0, 0.01, 0.5))
+    assert (plain.measure, plain.weighed, plain.stated.dearest_share) == ("success", "", None)
+    assert (heavy.measure, heavy.weighed) == ("utility", "duration 0.5")
+    assert plain.stated.promote_share == heavy.stated.promote_share and plain.gains == heavy.gains
+    assert heavy.stated.dearest_share < light.stated.dearest_share
+    assert light.stated.dearest_share == pytest.approx(light.stated.promote_share, abs=0.06)
+    assert "utility 0.5 against 0.8" in by_name(heavy)["verdict_reachable"].says

@@ -19,9 +19,10 @@ from benchmarks.decision.__main__ import (
     rule_alone,
     whole_gate,
 )
-from benchmarks.decision.catalogue import WORLDS
+from benchmarks.decision.catalogue import GRADED, WORLDS
 from benchmarks.decision.worlds import CONDITIONS, World, draw, outcomes
 from gates.stress import gains
+from gates.stress.weights import LEAST_OF_A_SUCCESS
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import paired_e_value
 
@@ -53,6 +54,24 @@ def test_every_world_at_the_margin_gains_the_margin_and_no_more():
         drawn = draw(world, 10, stream(1, name))
         gains_ = drawn.of_method.mean(axis=1) - drawn.simple.mean(axis=1).max()
         assert gains_ == pytest.approx([0.05] * len(world.candidates))
+
+
+def test_graded_worlds_at_the_margin_gain_the_margin_as_they_are_drawn():
+    """Utilities are 0, the floor or 1; their means are the true ones, and gain what is said."""
+    for world in GRADED[:4]:
+        drawn = draw(world, 4000, stream(1, world.name))
+        assert set(np.unique(drawn.candidates)) <= {0.0, LEAST_OF_A_SUCCESS, 1.0}
+        own, simple = drawn.candidates.mean(axis=(1, 2)), drawn.baselines.mean(axis=(1, 2))
+        assert own == pytest.approx(drawn.truth.mean(axis=1), abs=0.03)
+        assert simple == pytest.approx(world.baselines, abs=0.03)
+        assert own[0] - simple.max() == pytest.approx(0.05, abs=0.03)
+
+
+def test_the_whole_gate_says_of_graded_outcomes_what_the_rule_says(shipped):
+    settings, limits, section = shipped
+    cheaper = next(world for world in WHOLE if world.name == "graded_cheaper")
+    found = whole_gate(cheaper, settings, limits, section, 1)
+    assert found["verdicts"] == {"PASS": 1}  # all succeed, the candidate at less cost
 
 
 def test_a_trial_is_drawn_the_same_again_and_another_is_another():
@@ -212,7 +231,9 @@ def test_an_edit_of_the_rule_is_other_code(tmp_path, place):
 def test_the_page_shows_as_many_trials_as_its_command_asks_for():
     page = (ROOT / "docs" / "decision-accuracy.md").read_text()
     asked = arguments([])
-    for name, column, trials in (("promotion", 3, asked.trials), ("whole", 2, asked.whole)):
+    shown_in = {"promotion": (3, asked.trials), "graded": (3, asked.graded),
+                "whole": (2, asked.whole)}  # fmt: skip
+    for name, (column, trials) in shown_in.items():
         table = page.partition(tables.BEGIN.format(name))[2].partition(tables.END.format(name))[0]
         rows = [line.split("|") for line in table.splitlines() if line.startswith("| ")]
         shown = {row[column].strip() for row in rows if row[1].strip() != "world"}

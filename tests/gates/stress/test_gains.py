@@ -45,7 +45,7 @@ def test_the_worst_condition_comes_first_with_the_baseline_that_gains_most_on_it
     won(ladder, "nominal", "act", every(2))
     text = told(ladder)
     assert text.startswith(
-        f"on {evidence.STARTS} starts in each condition, worst in queue_reorder "
+        f"success on {evidence.STARTS} starts in each condition, worst in queue_reorder "
         "-100 points over bc_noise, "
     )
     assert ", nominal +50 points over act" in text

@@ -6,7 +6,7 @@ import pytest
 from asked import settings_of
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.stress.pairs import paired_by_condition, paired_differences, success_by_start
+from gates.stress.pairs import paired_by_condition, paired_differences, worth_by_start
 
 TABLE = "stress/rollouts.parquet"
 
@@ -24,7 +24,7 @@ def test_conditions_and_seeds_of_a_start_are_one_number(ladder):
         first = frame.assign(success=frame["success"] | own, outcome=ended)
         return type(frame)(np.vstack([first, second]), columns=frame.columns).astype(frame.dtypes)
 
-    means = success_by_start(*edit(ladder, change), "flow")
+    means = worth_by_start(*edit(ladder, change), "flow")
     assert list(means.index) == list(range(evidence.STARTS))
     assert means[4] == pytest.approx(0.5)  # one seed succeeds everywhere, the other nowhere
 
