@@ -86,7 +86,8 @@ def test_what_is_gained_outside_the_envelope_alone_is_no_promotion(ladder):
     (answer,) = [c for c in found_in(report, promotion_e_value.id) if c.candidate == "flow"]
     assert answer.verdict == "INCONCLUSIVE" and report.candidates["flow"] == "INCONCLUSIVE"
     assert (
-        "inside the envelope +0 points over " in answer.caveat and before.value >= answer.threshold
+        "inside the envelope +0 points of success over " in answer.caveat
+        and before.value >= answer.threshold
     )
 
 
