@@ -75,8 +75,10 @@ def explained(weights: Weights, longest_s: float) -> str:
     """What is compared, for the head of a report, with who weighs what and why."""
     parts = [
         f"{weight:g} of {COSTS[name]} (the {owner} owner: {reason})"
+        for name in COSTS
         for owner, costs in weights.items()
-        for name, (weight, reason) in costs.items()
+        if name in costs
+        for weight, reason in [costs[name]]
     ]
     return (
         f"Compared is utility and not success alone: a success counts 1 less {'; '.join(parts)}, "
