@@ -18,6 +18,7 @@ from gates.evidence import MissingEvidenceError
 from gates.plan_text import plan_text
 from gates.planning import _counted, plan_of
 from gates.proof import judge
+from gates.recount import AtLeast
 from gates.settings import read_params
 from gates.stress.cost import _rollouts_with
 from gates.stress.rollouts import StressSettings
@@ -58,7 +59,7 @@ def limit(gate, name):
 def hit(hits, starts):
     return pd.DataFrame({
         "perturbation": ["nominal"] * starts, "start": range(starts),
-        "hit": [number < hits for number in range(starts)],
+        "hit": [int(number < hits) for number in range(starts)],
     })  # fmt: skip
 
 
@@ -68,7 +69,10 @@ def test_most_failures_are_those_with_which_the_gate_passes(planned, name, start
     bound = by_name(planned(starts=starts))[name]
     most = int(bound.says.split()[2])
     settings = StressSettings.model_construct(perturbations=("nominal",), confidence=0.95)
-    values = [_rollouts_with(hit(hits, starts), settings).value for hits in (most, most + 1)]
+    values = [
+        _rollouts_with(hit(hits, starts), AtLeast("hit", 1), settings).value
+        for hits in (most, most + 1)
+    ]
     assert values[0] <= limit("D", name) < values[1]
     assert bound.decidable is True
 
@@ -362,4 +366,4 @@ def test_a_plan_of_utility_says_so_and_what_costs_may_leave_of_its_power(tmp_pat
     assert plain.stated.promote_share == heavy.stated.promote_share and plain.gains == heavy.gains
     assert heavy.stated.dearest_share < light.stated.dearest_share
     assert light.stated.dearest_share == pytest.approx(light.stated.promote_share, abs=0.06)
-    assert "utility 0.5 against 0.8" in by_name(heavy)["verdict_reachable"].says
+    assert "utility of 80 % against 50 %" in by_name(heavy)["verdict_reachable"].says

@@ -16,6 +16,7 @@ from gates.stress.pairs import paired_by_condition, paired_differences
 from gates.stress.rollouts import rollouts
 from gates.stress.utility import utilities
 from gates.stress.weights import LEAST_OF_A_SUCCESS
+from gates.words import points
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
 
@@ -104,10 +105,10 @@ def test_a_gain_of_costs_alone_is_one_of_utility_and_none_of_success(ladder):
     report = judge(ladder, "D")
     (found,) = [c for c in found_in(report, "promotion_e_value") if c.candidate == "flow"]
     gain = 0.5 * (LIMIT_S - 2.0) / LIMIT_S
-    assert found.verdict == "PASS" and f"mean gain in utility {gain:.4g}" in found.caveat
-    assert "in success alone +0 over" in found.caveat
+    assert found.verdict == "PASS" and f"mean gain in utility {points(gain)}" in found.caveat
+    assert "in success alone +0 points over" in found.caveat
     assert f"utility on {evidence.STARTS} starts in each condition" in found.caveat
-    assert f"inside the envelope {gain:+.4g} of utility" in found.caveat
+    assert f"inside the envelope {points(gain)} of utility" in found.caveat
     said = gain_of({"D": report}, Evidence(ladder))
     assert f"worth {1 - 0.5 / 6:.3g} against 0.5: +{100 * gain:.3g} points of utility" in said
     plan = settings_of(ladder, "D")
