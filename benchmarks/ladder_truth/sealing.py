@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from securesystemslib.signer import SSlibKey
 
-from gates.card.signing import PAYLOAD_TYPE
+from gates.card.envelope_file import PAYLOAD_TYPE
 from genpolicy.integrity.documents import canonical_json
 
 SIGNERS = ("rita", "mo", "pia", "col", "sam")

@@ -16,6 +16,9 @@ from gates.card.judge import CardGateSettings
 from gates.card.names import says
 from gates.card.people import (
     ALLOW_LIST,
+    BE_AT_THE_STOP,
+    BE_INDEPENDENT,
+    BE_LISTED,
     REVIEWER,
     AllowList,
     dependence,
@@ -32,6 +35,9 @@ from genpolicy.errors import ConfigError
 NONCE_BYTES = 16
 ABORT = "abort."
 """Prefix of an abort threshold among the answers."""
+NOT_ASKED = "Leave it out: what is not asked is fixed by the draft, or drawn."
+REDRAFT = "Complete section `card` of params.yaml, then draft again: `dvc repro card`."
+LOWER = "Give a number of that range; another limit is planned, and run, before."
 
 
 @dataclass(frozen=True)
@@ -111,13 +117,18 @@ def filled(rules: Rules, answers: Mapping[str, str]) -> TrialCard:
     """
     asked = {question.name: question for question in questions(rules)}
     if unknown := sorted(set(answers) - set(asked)):
-        raise _refused(unknown[0], "not asked", f"one of {', '.join(asked)}")
+        raise _refused(unknown[0], "not asked", f"one of {', '.join(asked)}", NOT_ASKED)
     values: dict[str, Any] = {"nonce": secrets.token_hex(NONCE_BYTES)}
     thresholds: dict[str, float] = {}
     for name, question in asked.items():
         said = answers.get(name, question.proposed)
         if said is None:
-            raise _refused(name, "not answered", question.text)
+            raise _refused(
+                name,
+                "not answered",
+                question.text,
+                f"Give it with `--set {name}=…`, or answer at a terminal.",
+            )
         value = answer(rules, name, said, values)
         if name.startswith(ABORT):
             thresholds[name.removeprefix(ABORT)] = value
@@ -125,7 +136,9 @@ def filled(rules: Rules, answers: Mapping[str, str]) -> TrialCard:
             values[name] = value
     card = rules.draft.model_copy(update={**values, "abort_thresholds": thresholds})
     if missing := missing_fields(card):
-        raise _refused(missing[0], "empty in the draft", "what the ladder and params.yaml give")
+        raise _refused(
+            missing[0], "empty in the draft", "what the ladder and params.yaml give", REDRAFT
+        )
     return card
 
 
@@ -150,30 +163,35 @@ def answer(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> Any
 def _threshold(rules: Rules, name: str, said: str) -> float:
     value, most = _number(name, said), rules.draft.abort_thresholds[name.removeprefix(ABORT)]
     if not 0 <= value <= most:
-        raise _refused(name, said, f"0 to {most:g}: it may be lowered, never raised")
+        raise _refused(name, said, f"0 to {most:g}: it may be lowered, never raised", LOWER)
     return value
 
 
 def _force(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> float:
     value = _number(name, said)
     if not 0 < value <= HARDEST_CONTACT_N:
-        raise _refused(name, said, f"above 0 and at most {HARDEST_CONTACT_N:g} N")
+        raise _refused(
+            name,
+            said,
+            f"above 0 and at most {HARDEST_CONTACT_N:g} N",
+            "Give the force that was measured for this cell; harder contact no card allows.",
+        )
     return value
 
 
 def _reviewer(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
     person = rules.allowed.find(said)
     if person is None or person.role != REVIEWER:
-        raise _refused(name, repr(said), f"the id of a {REVIEWER} on {ALLOW_LIST}")
+        raise _refused(name, repr(said), f"the id of a {REVIEWER} on {ALLOW_LIST}", BE_LISTED)
     if why := dependence(said, rules.draft.authors, [person], rules.allowed):
-        raise _refused(name, why, "somebody who did not make the candidate")
+        raise _refused(name, why, "somebody who did not make the candidate", BE_INDEPENDENT)
     return said
 
 
 def _spotter(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
     """Nobody is named as reviewer yet; whoever has that role is told all the same."""
     if why := spotting(said, "", rules.draft.authors, rules.allowed):
-        raise _refused(name, why, "somebody else who may stop the trial")
+        raise _refused(name, why, "somebody else who may stop the trial", BE_AT_THE_STOP)
     return said
 
 
@@ -194,13 +212,23 @@ def _valid(rules: Rules, name: str, said: str, days: tuple[str, str]) -> str:
         on = rules.today
     valid, why = validity(card, today=on, maximum_days=rules.maximum_days)
     if not valid:
-        raise _refused(name, f"{said!r} ({why})", "a day, YYYY-MM-DD, of a card that is valid")
+        raise _refused(
+            name,
+            f"{said!r} ({why})",
+            "a day, YYYY-MM-DD, of a card that is valid",
+            f"Give a day from {rules.today} on; at most {rules.maximum_days} in all.",
+        )
     return said
 
 
 def _text(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
     if not says(said):
-        raise _refused(name, repr(said), "words that a reader sees")
+        raise _refused(
+            name,
+            repr(said),
+            "words that a reader sees",
+            "Write it out; spaces, dashes and characters without a shape say nothing.",
+        )
     return said
 
 
@@ -217,13 +245,13 @@ def _number(name: str, said: str) -> float:
     try:
         return float(said)
     except ValueError:
-        raise _refused(name, repr(said), "a number") from None
+        raise _refused(
+            name, repr(said), "a number", "Write digits and a decimal point, without the unit."
+        ) from None
 
 
-def _refused(name: str, found: str, expected: str) -> ConfigError:
-    return ConfigError(
-        where=f"the card's {name}", found=found, expected=expected, action="Answer it again."
-    )
+def _refused(name: str, found: str, expected: str, action: str) -> ConfigError:
+    return ConfigError(where=f"the card's {name}", found=found, expected=expected, action=action)
 
 
 def rules_of(root: Path, today: datetime.date) -> Rules:

@@ -25,7 +25,7 @@ from gates.card.card import (
 )
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
 from gates.card.papers import Papers, examine
-from gates.card.people import ALLOW_LIST, load_allow_list
+from gates.card.people import ALLOW_LIST, REVIEWER, load_allow_list
 from gates.card.rollback import require_rollback
 from gates.card.signing import (
     CARDS,
@@ -239,11 +239,16 @@ def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
     always=True,
 )
 def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
-    """1 if the named reviewer signed, no signer is an author and the spotter is neither, else 0."""
+    """1 if the named reviewer signed, no signer is an author and the spotter is neither, else 0.
+
+    Waits where others signed first, and that reviewer can still do so.
+    """
     found = _signed(evidence, dossier, "review by someone who is no author")
     if isinstance(found, Measured):
         return found
     independent, text = independence(found, load_allow_list(evidence.root))
+    if independent is None:
+        return _waiting(f"review and sign-off by {found.card.reviewer}")
     return Measured(float(independent), caveat=text)
 
 
@@ -254,13 +259,15 @@ def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
     always=True,
 )
 def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
-    """Owners whose signatures verified."""
+    """Owners whose signatures verified; waits for the others while nobody signed out of turn."""
     found = _signed(evidence, dossier, "sign-off by model, perception, controller and safety owner")
     if isinstance(found, Measured):
         return found
     roles = {person.role for person in found.signers} & set(OWNERS)
     missing = [role for role in OWNERS if role not in roles]
-    return Measured(float(len(roles)), caveat=f"missing: {', '.join(missing)}" if missing else "")
+    waits = {person.role for person in found.signers} <= {REVIEWER, *OWNERS}
+    text = f"missing: {', '.join(missing)}" if missing else ""
+    return Measured(float(len(roles)), caveat=text, pending=waits)
 
 
 @criterion(

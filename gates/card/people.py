@@ -21,6 +21,19 @@ from genpolicy.integrity.documents import read_yaml
 ALLOW_LIST = "reviewers.yaml"
 REVIEWER, AUTHOR, SPOTTER = "reviewer", "author", "spotter"
 ROLES = (REVIEWER, *OWNERS, AUTHOR, SPOTTER)
+BE_LISTED = (
+    f"Give the id as {ALLOW_LIST} writes it. Who is not on it runs `genpolicy card keygen`, and "
+    "has the entry that it prints committed there, in review."
+)
+BE_INDEPENDENT = (
+    f"Have somebody review and own it who did not make the candidate. Who did stands in "
+    f"`params.yaml: card.authors`, by an id of {ALLOW_LIST}."
+)
+BE_AT_THE_STOP = (
+    f"Name an owner by the id on {ALLOW_LIST}, or somebody whose role is `spotter` there; who is "
+    "not on it yet is entered in review."
+)
+"""What to do about somebody who cannot stand where a card names them."""
 ID_FORM = r"^[a-z0-9][a-z0-9._-]{0,63}$"
 PersonId = Annotated[str, Field(pattern=ID_FORM)]
 """ASCII, so that no two of them look alike by accident of spelling."""

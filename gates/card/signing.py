@@ -6,16 +6,13 @@ changes the statement, and the signatures no longer fit. This module signs only 
 key that a person hands to it; it makes and keeps none.
 """
 
-import base64
 import datetime
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
-from securesystemslib.dsse import Envelope as DsseEnvelope
 from securesystemslib.exceptions import VerificationError
 from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-defined]
 
@@ -27,8 +24,12 @@ from gates.card.card import (
     missing_fields,
     read_card,
 )
+from gates.card.envelope_file import dsse_envelope, parse_envelope, refused
 from gates.card.people import (
     ALLOW_LIST,
+    BE_AT_THE_STOP,
+    BE_INDEPENDENT,
+    BE_LISTED,
     REVIEWER,
     AllowList,
     Person,
@@ -40,15 +41,16 @@ from gates.preregistration import PREREGISTRATION, read_plan
 from gates.protection import is_rehearsal
 from gates.report import parse_section
 from gates.settings import PARAMS_FILE, read_params
-from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
-PAYLOAD_TYPE = "application/vnd.genpolicy.trial-card+json"
 STATEMENT_TYPE = "urn:genpolicy:statement:1"
 PREDICATE_TYPE = "urn:genpolicy:trial-card:1"
 CARDS = "cards"
+FILL = "Fill the current draft: `genpolicy card fill --out completed.json`; then have all sign it."
+PEM_FILE = "Give the file that `genpolicy card keygen` wrote to its owner."
+RETIRE = f"move it to a subfolder of {CARDS}/"
 
 
 @dataclass(frozen=True)
@@ -98,21 +100,37 @@ def open_envelope(root: Path, data: bytes, *, where: str, allowed: AllowList) ->
         BadInputError: Malformed, another payload type, unknown key, bad signature, or a payload
             that is not the statement of this chain.
     """
-    payload, signatures = _parse_envelope(data, where)
+    payload, signatures = parse_envelope(data, where)
     card = _card_of(payload, where)
     _check_fixed(root, card, where)
     if payload != statement(root, card):
-        raise _bad(where, "a payload that names other bytes than lie here", "this hash chain")
-    envelope = _dsse(payload, signatures, where)
+        raise refused(
+            where,
+            "a payload that names other bytes than lie here",
+            "this hash chain",
+            f"What it was signed for has changed: {RETIRE}. {FILL}",
+        )
+    envelope = dsse_envelope(payload, signatures, where)
     by_id = {person.key.keyid: person for person in allowed.people}
     unknown = [keyid for keyid in envelope.signatures if keyid not in by_id]
     if unknown:
-        raise _bad(where, f"signed by the unknown key {unknown[0][:12]}…", "listed keys only")
+        raise refused(
+            where,
+            f"signed by the unknown key {unknown[0][:12]}…",
+            "listed keys only",
+            f"Have the entry of that key committed to {ALLOW_LIST} if it belongs there. Else "
+            f"{RETIRE}, and have all sign the completed card again.",
+        )
     signers = tuple(by_id[keyid] for keyid in envelope.signatures)
     try:
         envelope.verify([person.key for person in signers], len(signers))
     except VerificationError as error:
-        raise _bad(where, "a signature that does not verify", "valid signatures only") from error
+        raise refused(
+            where,
+            "a signature that does not verify",
+            "valid signatures only",
+            f"One bad signature voids all: {RETIRE}, and have all sign the completed card again.",
+        ) from error
     return SignedCard(card, signers)
 
 
@@ -143,50 +161,103 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
             not theirs, the card is incomplete, changed, reviewed or owned by an author, or stands
             against another card of the same name.
     """
-    if is_rehearsal(read_params(root)):
-        raise _bad(PARAMS_FILE, "a rehearsal", "a ladder whose limits protect people")
-    if read_plan(root) is None:
-        raise _bad(PREREGISTRATION, "missing or malformed", "a plan committed before the evidence")
-    allowed = load_allow_list(root)
-    person = allowed.find(reviewer)
-    if person is None:
-        raise _bad(ALLOW_LIST, f"without {reviewer!r}", "the id of a listed person")
-    key = _private_key(key_file)
-    if SSlibKey.from_crypto(key.public_key()).keyid != person.key.keyid:
-        raise _bad("the private key", "another key", f"the key that {ALLOW_LIST} lists for them")
+    allowed, person, key = _signer(root, key_file, reviewer)
     where = card_file.name
     data = sha256_bytes_of(card_file, keep=True)[1]
     signatures: list[dict[str, str]] = []
     if card_file.name.endswith(".dsse.json"):
         card = open_envelope(root, data, where=where, allowed=allowed).card
-        payload, signatures = _parse_envelope(data, where)
-        if person.key.keyid in {entry["keyid"] for entry in signatures}:
-            raise _bad(where, f"signed by {person.id} already", "one signature of each person")
+        payload, signatures = parse_envelope(data, where)
     else:
         card = read_card(data, where=where)
         _check_fixed(root, card, where)
         payload = statement(root, card)
     _check_signable(card, person, allowed, where)
-    envelope = _dsse(payload, signatures, where)
-    envelope.sign(CryptoSigner(key))
     target = root / CARDS / f"{card.name}.dsse.json"
-    if target.exists() and _parse_envelope(target.read_bytes(), target.name)[0] != payload:
-        raise _bad(target.name, "another card of this name", "one card; retire the other first")
+    if target.exists():
+        signatures = _with_those_of(root, target, payload, signatures, allowed)
+    if person.key.keyid in {entry["keyid"] for entry in signatures}:
+        raise refused(
+            target.name,
+            f"signed by {person.id} already",
+            "one signature of each person",
+            "There is nothing more for this person to do; the others sign.",
+        )
+    envelope = dsse_envelope(payload, signatures, where)
+    envelope.sign(CryptoSigner(key))
     write_bytes(target, canonical_json(envelope.to_dict()))
     return target
 
 
-def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool, str]:
-    """Whether the named reviewer signed, no signer is an author, and another stands at the stop."""
+def _signer(
+    root: Path, key_file: Path, reviewer: str
+) -> tuple[AllowList, Person, Ed25519PrivateKey]:
+    """Who may sign, who is about to, and with which key; refused before any card is read."""
+    if is_rehearsal(read_params(root)):
+        raise refused(
+            PARAMS_FILE,
+            "a rehearsal",
+            "a ladder whose limits protect people",
+            "Sign the card of a ladder without `rehearsal: true`; of a rehearsal none is signed.",
+        )
+    if read_plan(root) is None:
+        raise refused(
+            PREREGISTRATION,
+            "missing or malformed",
+            "a plan committed before the evidence",
+            "Write it with `genpolicy gates preregister`, commit it, and measure again: "
+            "`dvc repro`. A plan counts for evidence that came after it.",
+        )
+    allowed = load_allow_list(root)
+    person = allowed.find(reviewer)
+    if person is None:
+        raise refused(ALLOW_LIST, f"without {reviewer!r}", "the id of a listed person", BE_LISTED)
+    key = _private_key(key_file)
+    if SSlibKey.from_crypto(key.public_key()).keyid != person.key.keyid:
+        raise refused(
+            "the private key",
+            "another key",
+            f"the key that {ALLOW_LIST} lists for {person.id}",
+            "Sign with the private key of that entry. Who has lost it makes another with "
+            "`genpolicy card keygen`, and has the entry changed in review.",
+        )
+    return allowed, person, key
+
+
+def _with_those_of(
+    root: Path, target: Path, payload: bytes, signatures: list[dict[str, str]], allowed: AllowList
+) -> list[dict[str, str]]:
+    """The signatures that lie there under this very card, verified, and those that are brought."""
+    data = sha256_bytes_of(target, keep=True)[1]
+    there, found = parse_envelope(data, target.name)
+    if there != payload:
+        raise refused(
+            target.name,
+            "another card of this name",
+            "the signatures of one card",
+            f"Is that the card that is meant, sign it: `--card {CARDS}/{target.name}`. Is it this "
+            f"one, move the other to a subfolder of {CARDS}/ first; all sign again. Filling a "
+            "draft twice gives two cards: fill it once, and hand that file on.",
+        )
+    open_envelope(root, data, where=target.name, allowed=allowed)
+    known = {entry["keyid"] for entry in found}
+    return [*found, *(entry for entry in signatures if entry["keyid"] not in known)]
+
+
+def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool | None, str]:
+    """Whether the named reviewer signed, no signer is an author, and another stands at the stop.
+
+    None where that reviewer has only still to sign: nobody else reviewed in their place.
+    """
     card = signed.card
+    why = dependence(card.reviewer, card.authors, signed.signers, allowed)
+    if why := why or spotting(card.spotter, card.reviewer, card.authors, allowed):
+        return False, why
     names = [person.id for person in signed.signers if person.role == REVIEWER]
     if card.reviewer not in names:
-        return False, "the reviewer named on the card did not sign"
-    why = dependence(card.reviewer, card.authors, signed.signers, allowed)
-    if why:
-        return False, why
-    if why := spotting(card.spotter, card.reviewer, card.authors, allowed):
-        return False, why
+        named = allowed.find(card.reviewer)
+        known = named is not None and named.role == REVIEWER and not names
+        return None if known else False, f"{card.reviewer}, whom the card names, did not review it"
     made = f"candidate by {', '.join(card.authors)}"
     return True, f"reviewed by {card.reviewer}, {made}, {card.spotter} stands at the stop"
 
@@ -210,52 +281,51 @@ def utc_today() -> datetime.date:
 def _check_signable(card: TrialCard, person: Person, allowed: AllowList, where: str) -> None:
     missing = missing_fields(card)
     if missing:
-        raise _bad(where, f"incomplete ({', '.join(missing)})", "every field filled by a person")
+        raise refused(
+            where, f"incomplete ({', '.join(missing)})", "every field filled by a person", FILL
+        )
     if person.role == REVIEWER and person.id != card.reviewer:
-        raise _bad(where, f"naming the reviewer {card.reviewer!r}", f"{person.id!r}")
+        raise refused(
+            where,
+            f"naming the reviewer {card.reviewer!r}",
+            f"{person.id!r}",
+            f"Have {card.reviewer} sign, or fill the draft again with {person.id} as reviewer.",
+        )
     why = dependence(card.reviewer, card.authors, [person], allowed)
     if why:
-        raise _bad(where, why, "people who did not make the candidate")
+        raise refused(
+            where,
+            why,
+            "people who did not make the candidate",
+            BE_INDEPENDENT,
+        )
     if why := spotting(card.spotter, card.reviewer, card.authors, allowed):
-        raise _bad(f"{where}: spotter", why, "somebody else who may stop the trial")
+        raise refused(
+            f"{where}: spotter",
+            why,
+            "somebody else who may stop the trial",
+            f"Fill the draft again. {BE_AT_THE_STOP}",
+        )
 
 
 def _check_fixed(root: Path, card: TrialCard, where: str) -> None:
     draft = read_draft(root)
     for name in FIXED:
         if getattr(card, name) != getattr(draft, name):
-            raise _bad(f"{where}: {name}", "another value", f"that of {draft_path(root).name}")
+            raise refused(
+                f"{where}: {name}",
+                "another value",
+                f"that of {draft_path(root).name}",
+                f"What the draft fixes, nobody fills in. {FILL}",
+            )
     lacking = left_out(draft.caveats, card)
     if lacking:
-        text = f"all {len(draft.caveats)} of {draft_path(root).name}; more may be added"
-        raise _bad(f"{where}: caveats", f"without {lacking[0][:60]!r}", text)
-
-
-def _parse_envelope(data: bytes, where: str) -> tuple[bytes, list[dict[str, str]]]:
-    document = parse_json(data, where=where)
-    if not isinstance(document, dict) or set(document) != {"payload", "payloadType", "signatures"}:
-        raise _bad(where, "another document", "payload, payloadType and signatures")
-    if document["payloadType"] != PAYLOAD_TYPE:
-        raise _bad(f"{where}: payloadType", repr(document["payloadType"])[:60], PAYLOAD_TYPE)
-    signatures = document["signatures"]
-    if not isinstance(signatures, list) or not signatures:
-        raise _bad(f"{where}: signatures", "empty", "at least one signature")
-    for entry in signatures:
-        if not isinstance(entry, dict) or set(entry) != {"keyid", "sig"}:
-            raise _bad(f"{where}: signatures", "another form", "keyid and sig")
-        if not isinstance(entry["keyid"], str):
-            raise _bad(f"{where}: keyid", repr(entry["keyid"])[:60], "a text")
-        _decoded(entry["sig"], f"{where}: sig")
-    return _decoded(document["payload"], f"{where}: payload"), signatures
-
-
-def _decoded(text: Any, where: str) -> bytes:
-    try:
-        if not isinstance(text, str):
-            raise ValueError("no text")
-        return base64.b64decode(text, validate=True)
-    except ValueError as error:
-        raise _bad(where, "not base64", "whole base64 text") from error
+        raise refused(
+            f"{where}: caveats",
+            f"without {lacking[0][:60]!r}",
+            f"all {len(draft.caveats)} of {draft_path(root).name}; more may be added",
+            f"Put each back, word for word; or begin again. {FILL}",
+        )
 
 
 def _card_of(payload: bytes, where: str) -> TrialCard:
@@ -264,33 +334,13 @@ def _card_of(payload: bytes, where: str) -> TrialCard:
     return parse_section(TrialCard, predicate, where=f"{where}: predicate")
 
 
-def _dsse(payload: bytes, signatures: list[dict[str, str]], where: str) -> DsseEnvelope:
-    try:
-        return DsseEnvelope.from_dict(
-            {
-                "payload": base64.b64encode(payload).decode(),
-                "payloadType": PAYLOAD_TYPE,
-                "signatures": [dict(entry) for entry in signatures],
-            }
-        )
-    except ValueError as error:
-        raise _bad(f"{where}: signatures", "two of one key", "one per key") from error
-
-
 def _private_key(path: Path) -> Ed25519PrivateKey:
     try:
         key = load_pem_private_key(path.read_bytes(), password=None)
     except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise _bad("the private key", "not readable", "a PEM file without password") from error
+        raise refused(
+            "the private key", "not readable", "a PEM file without password", PEM_FILE
+        ) from error
     if not isinstance(key, Ed25519PrivateKey):
-        raise _bad("the private key", type(key).__name__, "an Ed25519 key")
+        raise refused("the private key", type(key).__name__, "an Ed25519 key", PEM_FILE)
     return key
-
-
-def _bad(where: str, found: str, expected: str) -> BadInputError:
-    return IntegrityError(
-        where=where,
-        found=found,
-        expected=expected,
-        action="Have the card completed and signed again from the current draft.",
-    )

@@ -118,6 +118,20 @@ def test_a_finished_ladder_shows_no_stop_and_a_fail_is_one(finished: Path, tmp_p
     assert {stop.gate for stop in look(tmp_path, "small").stops} == {"A"}
 
 
+def test_a_gate_that_waits_stops_only_where_everybody_had_signed(tmp_path: Path) -> None:
+    """A signature that is taken away leaves nothing wrong to see, and lets nobody by."""
+    criterion = {
+        "id": "owners_signed", "verdict": "PENDING_REVIEW", "candidate": None, "measured": 3.0,
+        "threshold": 4.0, "comparison": ">=", "caveat": "missing: safety",
+    }  # fmt: skip
+    report = {"criteria": [criterion], "verdict": "PENDING_REVIEW", "caveats": []}
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports" / "gate_e.json").write_text(json.dumps(report))
+    assert look(tmp_path, "small").stops == ()
+    (stop,) = look(tmp_path, "signed").stops
+    assert stop == Stop("E", "owners_signed", "3.0, limit >= 4.0 (missing: safety)")
+
+
 AREAS = {
     "data", "labels", "leakage", "training", "checkpoint", "sampler", "projection", "queue",
     "supervisor", "evidence", "code", "limits", "signatures", "brought policies",

@@ -10,7 +10,8 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from securesystemslib.signer import SSlibKey
 
 from gates import proof
-from gates.card.signing import PAYLOAD_TYPE, sign_card
+from gates.card.envelope_file import PAYLOAD_TYPE
+from gates.card.signing import sign_card
 from genpolicy.integrity.documents import canonical_json
 
 TODAY = datetime.date(2026, 11, 21)

@@ -111,6 +111,43 @@ def test_an_answer_that_signing_would_refuse_is_refused_at_once(rules, name, sai
 
 
 @pytest.mark.parametrize(
+    ("name", "said", "action"),
+    [
+        ("force_limit_n", "1e9", "measured for this cell"),
+        ("force_limit_n", "30 N", "without the unit"),
+        ("force_limit_reason", "--", "Write it out"),
+        ("spotter", "nobody", "not on it yet is entered in review"),
+        ("spotter", "rita", "Name an owner"),
+        ("reviewer", "nobody", "genpolicy card keygen"),
+        ("expires", "soon", "at most 30 in all"),
+        ("not_before", "2026-11-31", "Give a day from 2026-11-21 on"),
+        ("abort.latency_s", "9", "another limit is planned, and run, before"),
+    ],
+)
+def test_each_refusal_of_an_answer_says_what_to_do(rules, name, said, action):
+    with pytest.raises(ConfigError) as refused:
+        answer(rules, name, said, {"not_before": TODAY.isoformat()})
+    assert action in refused.value.action
+
+
+def test_a_refusal_of_a_card_says_what_to_do(rules):
+    with pytest.raises(ConfigError) as refused:
+        filled(rules, {**ANSWERS, "nonce": "1"})
+    assert "is fixed by the draft, or drawn" in refused.value.action
+    with pytest.raises(ConfigError) as refused:
+        filled(rules, {})
+    assert "--set force_limit_n=" in refused.value.action
+    nobody = replace(rules, draft=rules.draft.model_copy(update={"task": ""}))
+    with pytest.raises(ConfigError) as refused:
+        filled(nobody, ANSWERS)
+    assert "section `card` of params.yaml" in refused.value.action
+    made_it = replace(rules, draft=rules.draft.model_copy(update={"authors": ("rita",)}))
+    with pytest.raises(ConfigError) as refused:
+        answer(made_it, "reviewer", "rita", {})
+    assert "did not make the candidate" in refused.value.action
+
+
+@pytest.mark.parametrize(
     ("first", "last"),
     [("2026-11-21", "2026-11-21"), ("2026-11-20", "2026-11-30"), ("2026-12-05", "2027-01-03")],
 )

@@ -180,6 +180,16 @@ def _in_alphabet(document):
     document["payload"] = f"!{document['payload']}"
 
 
+def _another_reviewer(team):
+    team.allow({**PEOPLE, **AUTHORS, "sue": "reviewer"})
+    team.forge(lambda s: s, ["sue", *list(PEOPLE)[1:]])
+
+
+def _out_of_turn(team):
+    team.allow({**PEOPLE, **AUTHORS, "sue": "spotter"})
+    team.forge(lambda s: s, [*list(PEOPLE)[:-1], "sue"])
+
+
 FORGERIES = {
     "a character that is no base64": (_document(_in_alphabet), "signature_valid"),
     "the payload as base64url": (_url_safe("payload"), "signature_valid"),
@@ -215,11 +225,11 @@ FORGERIES = {
         lambda t: t.forge(_edit(reviewer="sam")),
         "reviewer_independent",
     ),
-    "named reviewer did not sign": (
-        lambda t: t.forge(lambda s: s, list(PEOPLE)[1:]),
-        "reviewer_independent",
+    "another reviewer than the one who is named": (_another_reviewer, "reviewer_independent"),
+    "an owner is missing, and somebody without a role signed": (
+        _out_of_turn,
+        "owners_signed",
     ),
-    "an owner is missing": (lambda t: t.forge(lambda s: s, list(PEOPLE)[:-1]), "owners_signed"),
     "card of another candidate": (lambda t: t.forge(_edit(candidate="another")), "signature_valid"),
     "card of another checkpoint": (
         lambda t: t.forge(_edit(candidate_checkpoint_sha256="0" * 64)),
@@ -316,6 +326,45 @@ def test_forged_cards_are_refused(signed, kind):
     report = signed.judge()
     assert report.verdict not in ("PASS", "PENDING_REVIEW"), kind
     assert criterion in _red(report), (kind, _red(report))
+
+
+@pytest.mark.parametrize(
+    ("names", "waits", "measured"),
+    [
+        (["mo", "sam"], {"reviewer_independent", "owners_signed"}, 2.0),
+        (["rita"], {"owners_signed"}, 0.0),
+        (list(PEOPLE)[:-1], {"owners_signed"}, 3.0),
+        (list(PEOPLE)[1:], {"reviewer_independent"}, 4.0),
+    ],
+)
+def test_a_card_that_some_signed_waits_for_the_others(team, names, waits, measured):
+    team.sign(team.complete(), names)
+    report = team.judge()
+    assert report.verdict == "PENDING_REVIEW"
+    found = {c.id: c for c in report.criteria}
+    assert {name for name, c in found.items() if c.verdict == "PENDING_REVIEW"} == waits
+    assert all(c.verdict == "PASS" for name, c in found.items() if name not in waits)
+    assert found["owners_signed"].measured == measured
+    if "rita" not in names:
+        assert "review and sign-off by rita" in found["reviewer_independent"].caveat
+
+
+@pytest.mark.parametrize(
+    ("change", "red"),
+    [
+        ({"reviewer": "sue"}, "reviewer_independent"),
+        ({"reviewer": "ada"}, "reviewer_independent"),
+        ({"spotter": "ada"}, "reviewer_independent"),
+        ({"expires": "2026-11-20"}, "not_expired"),
+        ({"force_limit_n": 1e9}, "envelope_within_limits"),
+    ],
+)
+def test_whoever_has_still_to_sign_hides_nothing_that_is_wrong(team, change, red):
+    team.sign(team.complete(), ["mo"])
+    team.forge(_edit(**change), ["mo", "sam"])
+    report = team.judge()
+    assert report.verdict == "FAIL"
+    assert {c.id for c in report.criteria if c.verdict == "FAIL"} == {red}
 
 
 def test_a_card_that_lies_under_the_name_of_another_is_refused(signed):
