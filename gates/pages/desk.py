@@ -21,7 +21,6 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
     "E": ("owners_signed", "owners have signed"),
 }
 """The one number of each gate, and what it is a number of."""
-WAITS = "PENDING_REVIEW"
 
 
 @dataclass(frozen=True)
@@ -124,8 +123,13 @@ class Desk:
     parts: tuple[Part, ...]
 
 
-def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
-    """The desk of the reports that lie there and can be read."""
+def desk_of(reports: Mapping[Gate, GateReport], pending: str = "") -> Desk:
+    """The desk of the reports that lie there and can be read.
+
+    Args:
+        reports: By gate.
+        pending: What of the card waits for people, as `desk_card.Signing.pending` says it.
+    """
     present = [gate for gate in GATES if gate in reports]
     bars = [
         Bar(near, gate, at_its_end(near.answer), human(near.answer, near.answer.threshold))
@@ -135,7 +139,7 @@ def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
     judged = [answer for gate in present for answer in _shown(reports[gate])]
     doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
     return Desk(
-        asked=_asked(reports),
+        asked=_asked(reports, pending),
         boxes=tuple(
             replace(_box(gate, reports.get(gate)), overridden=_overridden(reports.get(gate)))
             for gate in GATES
@@ -155,7 +159,7 @@ def _shown(report: GateReport) -> list[Answer]:
     return [c for c in report.criteria if c.candidate is None or c.candidate in kept]
 
 
-def _asked(reports: Mapping[Gate, GateReport]) -> Asked:
+def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
     stopped = next((gate for gate in GATES if not _passes(reports.get(gate))), None)
     promoted = reports["D"].promoted if "D" in reports else None
     report = reports.get(stopped) if stopped else None
@@ -164,8 +168,6 @@ def _asked(reports: Mapping[Gate, GateReport]) -> Asked:
         return Asked(title, "The card says where, how fast, and until when.", "")
     if stopped == "E" and promoted:
         title = f"Asked of you: let {promoted} move a robot, supervised, inside one envelope?"
-        waiting = [] if report is None else [c for c in report.criteria if c.verdict == WAITS]
-        pending = f"{len(waiting)} criteria wait for people" if waiting else "the card is not drawn"
         return Asked(title, reports["D"].decision, pending)
     title = f"Nothing is asked of you yet: the ladder stops at gate {stopped}, {NAMES[stopped]}"
     if report is None:
@@ -196,6 +198,9 @@ def _box(gate: Gate, report: GateReport | None) -> Box:
     if report is None:
         return Box(gate, NAMES[gate], "NOT JUDGED", "", "")
     said = [c for c in _shown(report) if c.id == name]
+    if gate == "E" and said and said[0].threshold is not None:
+        signed, all_of = int(said[0].measured or 0), human(said[0], said[0].threshold)
+        return Box(gate, NAMES[gate], report.verdict, f"{signed or 'none'} of {all_of}", of)
     if not said or said[0].measured is None:
         return Box(gate, NAMES[gate], report.verdict, "", f"not measured: {of}")
     texts = {c.candidate: at_its_end(c) for c in said}

@@ -7,7 +7,7 @@ robot is stopped and for which days are left to the people who answer for them.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard
+from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard, missing_fields
 from gates.card.envelope import ENVELOPE_FILE
 from gates.card.papers import Papers, examine
 from gates.card.people import REVIEWER
@@ -72,6 +72,7 @@ class Signing:
         caveats: How many sentences the signer signs in spite of.
         signed: Who has signed, `id (role)`.
         lacking: Roles that have not.
+        fields: Fields that a person has still to fill; the nonce is drawn, and none of them.
         refusal: Why the card that lies there is refused; empty if none is.
         missing: Why nothing is shown; empty if something is.
     """
@@ -80,8 +81,19 @@ class Signing:
     caveats: int = 0
     signed: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
     refusal: str = ""
     missing: str = ""
+
+    @property
+    def pending(self) -> str:
+        """What waits for people: `5 signatures, 7 fields`; empty where nothing does."""
+        if self.missing:
+            return "the card is not drawn"
+        if self.refusal:
+            return "the card that lies here is refused"
+        open_ones = ((len(self.lacking), "signature"), (len(self.fields), "field"))
+        return ", ".join(f"{n} {what}{'s' if n > 1 else ''}" for n, what in open_ones if n)
 
 
 def papers_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Papers | None:
@@ -126,6 +138,11 @@ def signing_of(
         caveats=len(draft.caveats),
         signed=tuple(f"{person.id} ({person.role})" for person in people),
         lacking=tuple(role for role in (REVIEWER, *OWNERS) if role not in roles),
+        fields=tuple(
+            name
+            for name in missing_fields(papers.signed.card if papers.signed else draft)
+            if name != "nonce"
+        ),
         refusal=papers.refusal,
     )
 

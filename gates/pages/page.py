@@ -14,8 +14,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from gates.card.card import DRAFT_PATH, TrialCard
-from gates.card.papers import examine
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.overrides import said
 from gates.pages import (
@@ -43,6 +41,7 @@ from gates.pages import (
     tables_survival,
     tables_variations,
 )
+from gates.pages.card_shown import card_shown
 from gates.pages.clips import clips_of
 from gates.pages.desk import desk_of
 from gates.pages.desk_card import card_of, papers_of, signing_of
@@ -52,7 +51,7 @@ from gates.pages.desk_gain import gain_of
 from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
-from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
+from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
 from gates.pages.numbers import human, judged_at, limit_said, recounted, rests_on
 from gates.pages.rows import CRITERIA, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
@@ -116,7 +115,7 @@ def exact(value: float) -> str:
 
 def gate_page(root: Path, report: GateReport) -> str:
     """HTML of one gate's report; figures are drawn from the evidence below `root`."""
-    state, card = _card(root, report)
+    state, card, signing = card_shown(root, report)
     return _render(
         "gate.html",
         current=report.gate,
@@ -135,6 +134,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         identities=identities(Evidence(root), report),
         card=card,
         card_state=state,
+        signing=signing,
         overridden=[said(entry) for entry in report.overrides],
         rows=rows_of(root, report),
         rows_of_criteria=CRITERIA,
@@ -204,7 +204,7 @@ def index_page(root: Path) -> str:
         "index.html",
         current="",
         ladder=rows,
-        desk=desk_of(reports),
+        desk=desk_of(reports, signing.pending),
         overridden=list(dict.fromkeys(said(e) for r in reports.values() for e in r.overrides)),
         line=line_of(reports, evidence, card_of(papers)),
         gain=gain_of(reports, evidence),
@@ -250,28 +250,6 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
         report=report,
     )
     return row
-
-
-def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, list[str]]]]:
-    if report.gate != "E" or not (root / DRAFT_PATH).is_file():
-        return "", []
-    papers = examine(root, str(report.settings["card"]))
-    card: TrialCard | None = papers.signed.card if papers.signed else papers.draft
-    if card is None:
-        return "", []
-    state = "signed" if papers.signed else "draft, not signed"
-    return state, [(label(k), _lines(value)) for k, value in card.model_dump(mode="json").items()]
-
-
-def _lines(value: Any) -> list[str]:
-    """A field of the card as lines of text; none if it is empty."""
-    if value in (None, "", [], {}):
-        return []
-    if isinstance(value, dict):
-        return [f"{key}: {item}" for key, item in value.items()]
-    if isinstance(value, list) and not any(isinstance(item, str) for item in value):
-        return [", ".join(str(item) for item in value)]
-    return [str(item) for item in value] if isinstance(value, list) else [str(value)]
 
 
 def _render(template: str, **values: Any) -> str:

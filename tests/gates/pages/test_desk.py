@@ -1,11 +1,18 @@
 """The desk: what is asked in each state of the ladder, numbers as people read them."""
 
 import re
+import sys
+from pathlib import Path
 
 import evidence
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
+from team import Team
+
+from gates.evidence import Evidence
 from gates.pages.desk import HEADLINES, desk_of, remark
+from gates.pages.desk_card import papers_of, signing_of
 from gates.proof import judge
 from gates.report import GATES, read_report
 from gates.writing import write_gate
@@ -16,7 +23,8 @@ def desk(ladder):
     for gate in GATES:
         if (ladder / f"reports/gate_{gate.lower()}.json").is_file():
             found[gate] = read_report(ladder, gate)[0]
-    return desk_of(found)
+    at = Evidence(ladder)
+    return desk_of(found, signing_of(found, at, papers_of(found, at)).pending)
 
 
 def test_of_nothing_nothing_is_asked():
@@ -30,9 +38,42 @@ def test_a_passed_ladder_asks_for_the_promoted_and_says_what_waits(ladder):
     before = desk(ladder)
     assert before.asked.title.startswith("Asked of you: let ")
     assert before.asked.pending == "the card is not drawn"
-    report = write_gate(ladder, "E")
-    waiting = sum(c.verdict == "PENDING_REVIEW" for c in report.criteria)
-    assert waiting and desk(ladder).asked.pending == f"{waiting} criteria wait for people"
+    write_gate(ladder, "E")
+    assert desk(ladder).asked.pending == "5 signatures, 7 fields"
+    page = (ladder / "reports/index.html").read_text()
+    assert "<b>5 signatures, 7 fields.</b> Nothing moves before." in page
+    box = desk(ladder).boxes[-1]
+    assert (box.verdict, box.number, box.of) == (
+        "PENDING_REVIEW",
+        "none of 4",
+        "owners have signed",
+    )
+    assert "not measured: owners" not in page
+
+
+def test_a_card_that_some_signed_says_who_lacks_and_not_that_it_is_not_drawn(ladder):
+    team = Team(ladder)
+    team.sign(team.complete(), ["mo", "sam"])
+    evidence.record(ladder)
+    write_gate(ladder, "E")
+    found = desk(ladder)
+    assert found.asked.pending == "3 signatures"
+    assert (found.boxes[-1].verdict, found.boxes[-1].number) == ("PENDING_REVIEW", "2 of 4")
+    page = (ladder / "reports/index.html").read_text()
+    assert "Signed by mo (model), sam (safety)." in page and "do not fill it again" in page
+    annex = (ladder / "reports/gate_e.html").read_text()
+    assert "The card (signed by 2 of 5)" in annex
+
+
+def test_of_a_card_that_is_refused_the_desk_says_so(ladder):
+    team = Team(ladder)
+    team.sign(team.complete(), ["mo"])
+    team.allow({})
+    evidence.record(ladder)
+    write_gate(ladder, "E")
+    found = desk(ladder)
+    assert found.asked.pending == "the card that lies here is refused"
+    assert (found.boxes[-1].verdict, found.boxes[-1].number) == ("FAIL", "none of 4")
 
 
 def test_a_stopped_ladder_says_where_by_what_and_never_asks(ladder):
@@ -134,6 +175,9 @@ def test_every_number_of_the_desk_is_one_of_the_reports(ladder, spoilt):
     for gate, box in zip(GATES, found.boxes, strict=True):
         report, name = reports[gate], HEADLINES[gate][0]
         assert (box.gate, box.verdict) == (gate, report.verdict)
+        if gate == "E":
+            assert (box.number, box.of) == ("none of 4", HEADLINES["E"][1])
+            continue
         said = [c for c in report.criteria if c.id == name]
         said = [c for c in said if c.candidate in (None, report.promoted)] or said
         shown = re.split(r", (?=[a-z])", box.number) if box.number else []

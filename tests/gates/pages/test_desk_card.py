@@ -42,6 +42,11 @@ def test_what_was_not_seen_is_not_proposed_and_left_to_people(whole, waits):
         "reviewer", "model", "perception", "controller", "safety",
     )  # fmt: skip
     assert signing.caveats == len(read_draft(whole).caveats) > 0
+    assert signing.fields == (
+        "expires", "force_limit_n", "force_limit_reason", "not_before", "reviewer", "spotter",
+        "stop_path",
+    )  # fmt: skip
+    assert signing.pending == "5 signatures, 7 fields"
 
 
 def test_the_box_and_the_speed_stand_beside_how_far_the_commands_went(whole, waits):
@@ -107,6 +112,7 @@ def test_what_people_set_and_who_they_are(copied, judged):
     items = by_field(signing)
     assert items["Ends it: contact force above"].yours == "30 N: measured at this cell"
     assert items["Days of validity"].yours == "2026-11-20 to 2026-11-30"
+    assert signing.pending == "3 signatures" and reports["E"].verdict == "PENDING_REVIEW"
     assert signing.signed == ("rita (reviewer)", "mo (model)")
     assert signing.lacking == ("perception", "controller", "safety")
     assert card.spotter == items["Who stands at it"].yours == "sam"
