@@ -18,6 +18,7 @@ from gates.doubts_of_evidence import (
     few_units,
     never_exercised,
     not_testable,
+    not_visited,
     one_seed,
     untried,
 )
@@ -28,6 +29,7 @@ from gates.report import GateReport
 from gates.settings import WAIVED
 from gates.stress.clocks import DIFFER, UNSEEN
 from gates.stress.contact import UNTOUCHED
+from gates.stress.visited import BEYOND
 from gates.verdicts import stopping
 
 OF_ALL = {
@@ -144,7 +146,7 @@ def _at_a_point(report: GateReport) -> Iterator[Doubt]:
 def _caveats(report: GateReport) -> Iterator[Doubt]:
     """What the gate itself says that it does not show, and what was waived."""
     for caveat in report.caveats:
-        if not UNTOUCHED.match(caveat):  # a rule speaks of it
+        if not (UNTOUCHED.match(caveat) or BEYOND.match(caveat)):  # a rule speaks of it
             yield Doubt(report.gate, "not shown", caveat)
 
 
@@ -166,6 +168,7 @@ RULES: Sequence[Callable[[GateReport], Iterator[Doubt]]] = (
     _not_measured,
     _not_decided,
     never_exercised,
+    not_visited,
     not_testable,
     _stopped,
     cold_start,

@@ -13,6 +13,7 @@ from gates.reproducibility.timing import DECLARED
 from gates.stress.contact import UNTOUCHED
 from gates.stress.cost import TOO_OLD
 from gates.stress.gains import WORST
+from gates.stress.visited import BEYOND
 
 FEW = 20
 """Units below which a number says little: of so many, none of which fails, an exact bound of 95 %
@@ -43,6 +44,13 @@ def never_exercised(report: GateReport) -> Iterator[Doubt]:
     for caveat in report.caveats:
         if found := UNTOUCHED.match(caveat):
             yield Doubt(report.gate, "never exercised", caveat, (), found[1])
+
+
+def not_visited(report: GateReport) -> Iterator[Doubt]:
+    """A card allows a whole box; where no rollout went in it, nothing was tried."""
+    for caveat in report.caveats:
+        if found := BEYOND.match(caveat):
+            yield Doubt(report.gate, "not visited", caveat, (), found[1])
 
 
 def not_testable(report: GateReport) -> Iterator[Doubt]:

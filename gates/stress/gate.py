@@ -22,6 +22,7 @@ from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
 from gates.stress.utility import utilities
 from gates.stress.weights import listed
+from gates.stress.visited import visited_said
 from gates.words import points
 
 
@@ -93,8 +94,9 @@ def _decide(judged: Judged) -> Decision:
 
 
 def _said(judged: Judged) -> list[str]:
-    """What was never touched, how the two clocks compare, and what monitors would have said."""
-    return [*contact_said(judged), *clocks_said(judged), *monitors_said(judged)]
+    """What was never touched or visited, how clocks compare, and what monitors would have said."""
+    beside = (contact_said, visited_said, clocks_said, monitors_said)
+    return [text for of in beside for text in of(judged)]
 
 
 GATE = GateSpec(

@@ -45,6 +45,20 @@ def test_what_was_tried_or_lacks_for_another_reason_was_not_left_unexercised(oth
     assert bool(said("not measured", other)) == (other.verdict == "INCONCLUSIVE")
 
 
+AROUND = (
+    "flow: the card's box reaches up to 20 mm beyond what was visited (-y 20 mm), so that a trial "
+    "may go where no rollout was."
+)
+
+
+def test_a_box_that_was_not_visited_is_a_doubt_and_no_general_caveat():
+    (doubt,) = said("not visited", caveats=(AROUND, "Simulation."))
+    assert doubt == Doubt("A", "not visited", AROUND, (), "flow")
+    (rest,) = said("not shown", caveats=(AROUND, "Simulation."))
+    assert rest.text == "Simulation."
+    assert not said("not visited", caveats=("Simulation.",))
+
+
 UNSEEN = "flow: no contact in 1,080 of 1,080 rollouts, so that no force of it was ever seen."
 
 
