@@ -74,7 +74,9 @@ def keygen(
         ) from error
     public = make_key(out.expanduser(), root=root)
     print(f"Wrote your private key to {out}. Keep it; nobody else may read it.")
-    print(f"Your entry for {ALLOW_LIST}; complete it, and have the change reviewed:")
+    print(
+        f"Your entry for {ALLOW_LIST}; you can sign once it is complete and committed, in review:"
+    )
     print(f"- id: {identifier}\n  name: \n  role: \n  public_key: {public}\n  emails: []")
     return 0
 
@@ -119,7 +121,8 @@ def fill(
     print(f"Wrote {out}, with {len(completed.caveats)} caveats that a signer signs in spite of:")
     for caveat in completed.caveats:
         print(f"- {caveat}")
-    print("Read them. Then sign: genpolicy card sign --card FILE --key KEY --reviewer ID")
+    print("Read them. Then the reviewer and the four owners each sign this very file:")
+    print(f"genpolicy card sign --card {out} --key KEY --reviewer ID")
     return 0
 
 

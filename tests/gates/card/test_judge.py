@@ -354,6 +354,7 @@ def test_a_card_that_some_signed_waits_for_the_others(team, names, waits, measur
     [
         ({"reviewer": "sue"}, "reviewer_independent"),
         ({"reviewer": "ada"}, "reviewer_independent"),
+        ({"reviewer": "pia"}, "reviewer_independent"),
         ({"spotter": "ada"}, "reviewer_independent"),
         ({"expires": "2026-11-20"}, "not_expired"),
         ({"force_limit_n": 1e9}, "envelope_within_limits"),
