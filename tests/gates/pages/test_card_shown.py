@@ -4,62 +4,52 @@ import re
 import sys
 from pathlib import Path
 
-import evidence
-
 sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
 from team import PEOPLE, Team
 
 from gates.pages.card_shown import card_shown
-from gates.writing import write_gate, write_index
+from gates.pages.page import gate_page
 
 
-def _table(page):
-    return re.search(r'<table class="signing">.*?</table>', page, re.DOTALL)[0]
+def test_what_one_signs_stands_on_the_page_of_the_gate_with_nothing_raw(whole, judged):
+    page = gate_page(whole, judged("E"))
+    table = re.search(r'<table class="signing">.*?</table>', page, re.DOTALL)[0]
+    _, _, signing = card_shown(whole, judged("E"))
+    cells = [cell for item in signing.items for cell in (item.field, item.proposed)]
+    assert len(cells) > 20 and all(f">{cell}</t" in table for cell in cells)
+    assert "x 350 to 700" in table
+    assert "{&#39;" not in page and "abort windows" not in page
+    assert page.count('id="card-caveats"') == 1
+    assert page.index("The card (draft, not signed)") < page.index("<h2>Criteria</h2>")
 
 
-def test_what_one_signs_stands_on_both_pages_alike_and_its_caveats_are_linked(ladder):
-    write_gate(ladder, "E")
-    write_index(ladder)
-    desk = (ladder / "reports/index.html").read_text()
-    annex = (ladder / "reports/gate_e.html").read_text()
-    assert _table(desk) == _table(annex) and "x 350 to 700" in _table(annex)
-    assert "{&#39;" not in annex and "abort windows" not in annex
-    assert re.search(r'<a href="gate_e.html#card-caveats">\d+ caveats</a>', desk)
-    assert annex.count('id="card-caveats"') == 1
-    assert annex.index("The card (draft, not signed)") < annex.index("<h2>Criteria</h2>")
-
-
-def test_other_fields_are_those_that_do_not_stand_beside_what_was_seen(ladder):
-    report = write_gate(ladder, "E")
-    state, fields, signing = card_shown(ladder, report)
+def test_other_fields_are_those_that_do_not_stand_beside_what_was_seen(whole, judged):
+    state, fields, signing = card_shown(whole, judged("E"))
     assert state == "draft, not signed" and signing is not None
     names = {name for name, _ in fields}
     assert {"candidate", "authors", "reports", "caveats", "reviewer", "nonce"} <= names
     assert not names & {"stop path", "spotter", "rollback", "abort windows", "expires"}
 
 
-def test_a_card_of_other_reports_is_shown_field_by_field_with_its_windows_in_words(ladder):
+def test_a_card_of_other_reports_is_shown_field_by_field_with_its_windows_in_words(copied, judged):
     """Nothing stands beside what was seen by other bytes; a window reads as a person says it."""
-    write_gate(ladder, "E")
-    report = write_gate(ladder, "E")
-    path = ladder / "reports/gate_d.json"
+    path = copied / "reports/gate_d.json"
     path.write_bytes(path.read_bytes() + b" ")
-    state, fields, signing = card_shown(ladder, report)
+    state, fields, signing = card_shown(copied, judged("E"))
     assert signing is None and state == "draft, not signed"
-    windows = dict(fields)["abort windows"]
-    assert windows and not any("{" in line for line in windows)
-    assert dict(fields)["speed limit, m/s"] == ["0.25"]
+    shown = dict(fields)
+    assert shown["abort windows"] and not any("{" in line for line in shown["abort windows"])
+    assert shown["speed limit, m/s"] == ["0.25"]
 
 
-def test_a_card_says_how_far_it_is_signed(ladder):
-    team = Team(ladder)
+def test_a_card_says_how_far_it_is_signed(copied, judged):
+    team = Team(copied)
     path = team.complete()
     for count, name in enumerate(PEOPLE, start=1):
         team.sign(path, [name])
-        evidence.record(ladder)
-        state = card_shown(ladder, write_gate(ladder, "E"))[0]
+        state = card_shown(copied, judged("E"))[0]
         assert state == (f"signed by {count} of 5" if count < 5 else "signed")
 
 
-def test_no_other_gate_has_a_card(ladder):
-    assert card_shown(ladder, write_gate(ladder, "A")) == ("", [], None)
+def test_no_other_gate_has_a_card(whole, judged):
+    assert card_shown(whole, judged("A")) == ("", [], None)

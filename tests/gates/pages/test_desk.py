@@ -42,6 +42,7 @@ def test_a_passed_ladder_asks_for_the_promoted_and_says_what_waits(ladder):
     assert desk(ladder).asked.pending == "5 signatures, 7 fields"
     page = (ladder / "reports/index.html").read_text()
     assert "<b>5 signatures, 7 fields.</b> Nothing moves before." in page
+    assert re.search(r'<a href="gate_e.html#card-caveats">\d+ caveats</a>', page)
     box = desk(ladder).boxes[-1]
     assert (box.verdict, box.number, box.of) == (
         "PENDING_REVIEW",
