@@ -21,8 +21,8 @@ from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
 from gates.stress.utility import utilities
-from gates.stress.weights import listed
 from gates.stress.visited import visited_said
+from gates.stress.weights import listed
 from gates.words import points
 
 
