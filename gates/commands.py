@@ -303,7 +303,7 @@ def require_beneath(root: Path) -> None:
     from gates.report import GATES
 
     require_history(root)
-    for gate in GATES[:-1]:
+    for gate in GATES:
         rederive(root, gate)
 
 

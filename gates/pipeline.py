@@ -36,7 +36,7 @@ RUNGS: dict[Gate, tuple[str, ...]] = {
     "B": ("candidates", "train_generators", "reload", "latency"),
     "C": ("shadow",),
     "D": ("wall_clock", "stress", "monitors"),
-    "E": ("card",),
+    "E": ("failure_search", "card"),
 }  # fmt: skip
 """Evidence stages between a gate and the one below it."""
 COMPILED = (".pyc", ".pyo")

@@ -54,10 +54,15 @@ def _warned(text: str) -> list[str]:
 
 def _beside(plan: Plan) -> list[str]:
     """What is run and not compared, where there is some."""
-    graded, probed = plan.graded_rollouts, plan.probe_rollouts
+    graded, probed, searched = plan.graded_rollouts, plan.probe_rollouts, plan.searched_rollouts
     return [
         *([f"{graded:,} beside them of graded sizes (stress.severities),"] if graded else []),
         *([f"up to {probed:,} after them for the monitors (monitors),"] if probed else []),
+        *(
+            [f"up to {searched:,} behind the gate for failures (card.failure_search),"]
+            if searched
+            else []
+        ),
     ]
 
 

@@ -23,6 +23,7 @@ from gates.stress.trial import reachable
 from gates.stress.weights import by_cost, listed
 from gates.verdicts import judge_criterion, rounded
 from genpolicy.evidence.documents.stress import Power
+from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
@@ -113,6 +114,8 @@ class Plan:
         graded_rollouts: Beside it, of conditions made harder or milder (`stress.severities`).
         probe_rollouts: After it, under probes and without, for the stage `monitors`,
             if every registered candidate is admitted.
+        searched_rollouts: Behind the gate, where failures of who passed are searched for, if every
+            registered candidate passes (`card.failure_search`).
         longest_s: Virtual time if each of all these rollouts took its limit, s.
         measure: What is compared: success, or utility where costs are weighed.
         weighed: Costs and weights; empty where success is compared.
@@ -131,6 +134,7 @@ class Plan:
     rollouts: int
     graded_rollouts: int
     probe_rollouts: int
+    searched_rollouts: int
     longest_s: float
     measure: str
     weighed: str
@@ -172,6 +176,8 @@ def plan_of(root: Path) -> Plan:
     rollouts = of_condition * len(planned.perturbations)
     graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
     probed = len(settings.candidates) * section(params, "monitors", MonitorsSettings).rollouts
+    looks = search_settings(params).failure_search * len(planned.perturbations)
+    searched = len(settings.candidates) * looks
     power = limits.number(REACHABLE, otherwise=POWER)
     table = power_document(
         planned, candidates=len(settings.candidates), root_seed=settings.root_seed
@@ -184,7 +190,8 @@ def plan_of(root: Path) -> Plan:
         rollouts=rollouts,
         graded_rollouts=graded,
         probe_rollouts=probed,
-        longest_s=(rollouts + graded + probed) * planned.episode_limit_s,
+        searched_rollouts=searched,
+        longest_s=(rollouts + graded + probed + searched) * planned.episode_limit_s,
         measure=settings.measure,
         weighed=listed(settings.utility),
         margin=settings.margin,

@@ -63,6 +63,7 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "stress": "C",
     "monitors": "C",
     "gate_d": None,
+    "failure_search": "D",
     "card": "D",
     "gate_e": None,
 }

@@ -22,6 +22,7 @@ from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_monitors import rederive_monitors
 from gates.rederive_refused import rederive_refused
+from gates.rederive_searched import rederive_searched
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.rederive_splices import rederive_splices
@@ -123,6 +124,8 @@ def _evidence(root: Path, gate: Gate) -> None:
         rederive_brought(root, params)
         rederive_conformance(root, params)
         rederive_costs(root, trainings(root, gate, params))
+    if gate == "E":
+        rederive_searched(root, params, _held_to(params))
     if gate not in FOLDERS:
         return
     folder, pattern = FOLDERS[gate]

@@ -23,6 +23,7 @@ from gates.overrides import is_said
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
+from genpolicy.evidence.failure_search.settings import MOST_EVALUATIONS
 from genpolicy.integrity.documents import canonical_json, parse_json
 
 CARD_SCHEMA_VERSION = 3
@@ -63,6 +64,8 @@ class CardSettings(GateSettings):
     Attributes:
         name: File name of the signed card: `cards/<name>.dsse.json`.
         authors: Who made the candidate, by identifier on the allow-list; they sign nothing.
+        failure_search: Rollouts in which failures are searched for before the draft, of each
+            candidate in each condition.
         task: Name of the task.
     """
 
@@ -70,6 +73,7 @@ class CardSettings(GateSettings):
 
     name: CardName
     authors: tuple[PersonId, ...]
+    failure_search: int = Field(default=0, ge=0, le=MOST_EVALUATIONS)
     task: str = Field(min_length=1)
 
 

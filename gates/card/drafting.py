@@ -6,6 +6,7 @@ from pathlib import Path
 from gates.card.card import CardSettings, TrialCard, draft_card, promoted, thresholds_of
 from gates.card.envelope import simulated_envelope, was_judged
 from gates.card.rollback import rollback_of
+from gates.card.searched import searched_caveats
 from gates.card.windows import windows_of
 from gates.evidence import Evidence
 from gates.report import Gate, GateReport
@@ -48,7 +49,7 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
             action="Run `dvc repro reload`.",
         )
     thresholds = thresholds_of(reports["D"])
-    return draft_card(
+    card = draft_card(
         settings,
         reports,
         hashes,
@@ -57,3 +58,5 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
         windows=windows_of(Evidence(root), candidate, simulated.condition, thresholds),
         rollback=rollback_of(reports, Evidence(root)).text,
     )
+    caveats = dict.fromkeys([*card.caveats, *searched_caveats(root, candidate)])
+    return card.model_copy(update={"caveats": tuple(caveats)})

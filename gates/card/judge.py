@@ -27,6 +27,7 @@ from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
 from gates.card.papers import Papers, examine
 from gates.card.people import ALLOW_LIST, REVIEWER, load_allow_list
 from gates.card.rollback import require_rollback
+from gates.card.searched import SEARCHED, searched_caveats
 from gates.card.signing import (
     CARDS,
     SignedCard,
@@ -150,6 +151,7 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None, day: datetim
         thresholds = thresholds_of(chain.reports["D"])
         windows = windows_of(Evidence(root), candidate, simulated.condition, thresholds)
         require_aborts(draft.abort_thresholds, draft.abort_windows, thresholds, windows)
+        required = [*caveats_of(chain.reports), *searched_caveats(root, candidate)]
     except (MissingEvidenceError, GenpolicyError) as error:
         return str(error)
     pinned = entry.checkpoint if entry else None
@@ -157,7 +159,7 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None, day: datetim
         return "the draft names other reports than lie here; run `dvc repro card`"
     if draft.candidate != candidate or draft.candidate_checkpoint_sha256 != pinned:
         return "the draft is for another candidate than gate D promotes; run `dvc repro card`"
-    lacking = "".join(left_out(caveats_of(chain.reports), draft)[:1])
+    lacking = "".join(left_out(required, draft)[:1])
     return lacking and f"the draft leaves out a caveat ({lacking[:60]!r}); run `dvc repro card`"
 
 
@@ -319,6 +321,7 @@ GATE = GateSpec(
     bind=(
         DRAFT_PATH,
         ENVELOPE_FILE,
+        SEARCHED,
         PREREGISTRATION,
         OVERRIDES,
         f"{CARDS}/*.dsse.json",

@@ -36,6 +36,7 @@ from gates.pages import (
     tables_monitors,
     tables_overruns,
     tables_recovery,
+    tables_searched,
     tables_severity,
     tables_stress,
     tables_survival,
@@ -104,7 +105,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         tables_faults.FAILED,
         *tables_stress.LISTINGS,
     ),
-    "E": (),
+    "E": (tables_searched.FOUND,),
 }
 
 

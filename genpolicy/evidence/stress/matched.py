@@ -21,7 +21,7 @@ from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.refused import refused_rows
 from genpolicy.evidence.stress.rollout import Rollout
-from genpolicy.evidence.stress.shard import Shard, ShardResult
+from genpolicy.evidence.stress.shard import Comparison, Shard, ShardResult
 from genpolicy.evidence.stress.shard_rows import (
     fault_rows,
     invocation_rows,
@@ -56,11 +56,16 @@ def _again(shard: Shard, policy: Policy, when: str) -> list[FixtureAgainRow]:
     return asked_again(policy, fixtures, condition=shard.perturbation, when=when)
 
 
-def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
+def setup_of(shard: Shard, task: Task, policy: Running) -> Setup:
+    """What all rollouts of a shard share, under a policy that is asked.
+
+    Raises:
+        ConfigError: The envelope of the condition is looser than the cell.
+    """
     comparison = shard.comparison
     horizons = comparison.cell.horizons
     joining = joining_of(comparison.joining, policy)
-    setup = Setup(
+    return Setup(
         task=task,
         checker=checker_under(
             shard.schedule,
@@ -81,12 +86,11 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         person=comparison.person,
         probe=shard.probe,
     )
-    epoch = task.calibration_epochs[-1]
-    rollouts = [
-        Rollout(setup, task.start_from_json(text), index, calibration_epoch=epoch)
-        for index, text in enumerate(comparison.starts)
-    ]
-    ticks = round(comparison.episode_limit_s / horizons.action_period_s)
+
+
+def run_out(rollouts: Sequence[Rollout], policy: Policy, comparison: Comparison) -> None:
+    """Advance rollouts in lockstep until each has ended, at the latest when its time is over."""
+    ticks = round(comparison.episode_limit_s / comparison.cell.horizons.action_period_s)
     for _ in range(ticks):
         active = [rollout for rollout in rollouts if not rollout.done]
         if not active:
@@ -94,6 +98,16 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         step(active, policy, samples=comparison.samples)
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
+
+
+def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
+    setup = setup_of(shard, task, policy)
+    epoch = task.calibration_epochs[-1]
+    rollouts = [
+        Rollout(setup, task.start_from_json(text), index, calibration_epoch=epoch)
+        for index, text in enumerate(shard.comparison.starts)
+    ]
+    run_out(rollouts, policy, shard.comparison)
     write_journal(shard.journal, [rollout.journal for rollout in rollouts])
     recoveries = [recovery_rows(shard, rollout) for rollout in rollouts]
     refused = [rollout.refused for rollout in rollouts]

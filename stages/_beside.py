@@ -1,0 +1,50 @@
+"""Runs a stage that stands beside the ladder: behind a promotion, and no gate asks for it.
+
+`stages._stage` counts the stages that lead to verdicts, and what trains depends on that file: a
+name more in it would train everything again. A stage of this list writes its folder, leaves with
+the same exit codes, and has its settings in a section of another stage.
+"""
+
+import contextlib
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from typing import NoReturn
+
+from genpolicy.errors import GenpolicyError
+from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
+from stages._stage import TIMES, Params, _record, _taken, load_params
+
+BESIDE = ("failure_search",)
+
+
+def main(name: str, work: Callable[[Params], None]) -> NoReturn:
+    """Run the body of stage `name` and leave with the exit code that its end deserves.
+
+    Args:
+        name: One of `BESIDE`.
+        work: Admits, measures, and writes the outputs.
+    """
+    started = time.perf_counter()
+    usual_s = _taken(name)
+    with contextlib.suppress(OSError):
+        (TIMES / f"{name}.json").unlink(missing_ok=True)
+    os.environ[STAGE] = f"[beside] {name}"
+    code = 0
+    try:
+        with still_at_it(usual_s, every_s=LOG_EVERY_S):
+            work(load_params())
+    except GenpolicyError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        code = error.exit_code
+    except Exception:
+        traceback.print_exc()
+        print(
+            f"{name}: this is a fault of genpolicy, not of your input. Report the lines above.",
+            file=sys.stderr,
+        )
+        code = 1
+    _record(name, started, code)
+    sys.exit(code)
