@@ -14,7 +14,7 @@ ON_THE_CPU = {
 }
 STAGES = (
     "measure_baselines", "measure_factors", "reload", "latency", "shadow", "wall_clock", "stress",
-    "monitors",
+    "monitors", "failure_search",
 )  # fmt: skip
 
 

@@ -82,6 +82,7 @@ def test_a_stage_that_asks_for_admission_depends_on_the_verdict_before_it() -> N
         "wall_clock": "c",
         "stress": "c",
         "monitors": "c",
+        "failure_search": "d",
         "card": "d",
     }
     for stage, gate in verdicts.items():
@@ -94,7 +95,7 @@ def test_a_stage_that_asks_for_admission_depends_on_the_verdict_before_it() -> N
 EVIDENCE = (
     "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
     "measure_factors", "train_generators", "reload", "latency", "shadow", "wall_clock",
-    "stress", "monitors",
+    "stress", "monitors", "failure_search",
 )  # fmt: skip
 TRAINING = ("train_baselines", "train_factors", "train_generators")
 JUDGING = ("gate_a", "gate_b", "gate_c", "gate_d", "card", "gate_e")
@@ -103,7 +104,7 @@ JUDGING = ("gate_a", "gate_b", "gate_c", "gate_d", "card", "gate_e")
 def test_an_edit_of_the_executor_runs_what_executes_again_and_no_other_evidence() -> None:
     direct, behind = rerun_after_edit("genpolicy/execution")
     again = [name for name in (*direct, *behind) if name in EVIDENCE]
-    assert again == ["shadow", "wall_clock", "stress", "monitors"]
+    assert again == ["shadow", "wall_clock", "stress", "monitors", "failure_search"]
 
 
 def test_each_file_that_is_left_out_of_its_folder_has_a_row_and_says_what_it_runs() -> None:
@@ -148,6 +149,7 @@ NEVER = {
     "shadow": {"policy", "train_generators", "stress"},
     "stress": {"policy", "train_generators", "latency", "shadow", "monitors"},
     "monitors": {"policy", "train_generators", "latency", "shadow", "stress"},
+    "failure_search": {"policy", "train_generators", "latency", "shadow", "monitors", "card"},
 }
 
 

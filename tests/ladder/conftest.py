@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from ladder_workspace import ALWAYS_RUN, copy_of, make_small_ladder, repro
 
+from stages._beside import BESIDE
 from stages._stage import STAGES
 
 
@@ -34,7 +35,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRe
             assert (ran[0], ran[-1], len(ran)) == (
                 "record",
                 "gate_e",
-                len(STAGES) - len(ALWAYS_RUN),
+                len(STAGES) + len(BESIDE) - len(ALWAYS_RUN),
             )
             done.touch()
     return workspace

@@ -27,7 +27,7 @@ ADDED = {
 }
 BEHIND_GATE_A = [
     "train_generators", "reload", "latency", "gate_b", "shadow", "gate_c", "wall_clock",
-    "stress", "monitors", "gate_d", "card", "gate_e",
+    "stress", "monitors", "gate_d", "failure_search", "card", "gate_e",
 ]  # fmt: skip
 
 

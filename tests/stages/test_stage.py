@@ -12,6 +12,7 @@ import yaml
 from genpolicy.errors import ContractError, RefusedError
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.progress import STAGE
+from stages._beside import BESIDE
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {
@@ -154,7 +155,8 @@ def test_a_stage_without_its_input_is_bad_input(workspace, stage, name) -> None:
 def test_the_names_of_stages_are_those_of_params_and_files(workspace) -> None:
     assert set(load_params().raw) == {*STAGES, *SHARED}
     files = {path.stem for path in (Path(__file__).parents[2] / "stages").glob("[!_]*.py")}
-    assert files == set(STAGES)
+    assert files == {*STAGES, *BESIDE}
+    assert not set(BESIDE) & {*STAGES, *SHARED}
 
 
 def refusal(_):

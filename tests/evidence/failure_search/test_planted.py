@@ -47,9 +47,7 @@ def found_by_search(task, *, evaluations=240, root_seed=ROOT_SEED, method="flow"
             for one, row in zip(asked, ended, strict=True)
         ]
 
-    search_with(
-        task, DELAY, evaluate, method=method, evaluations=evaluations, root_seed=root_seed
-    )
+    search_with(task, DELAY, evaluate, method=method, evaluations=evaluations, root_seed=root_seed)
     return rows
 
 

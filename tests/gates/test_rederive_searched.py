@@ -1,0 +1,117 @@
+"""What the card says of the failure search follows from journals and optimiser, or is refused."""
+
+import shutil
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from _probed import ROOT_SEED
+from _searched import EVALUATIONS, make_bench, section, write_searched
+
+from gates import rederive
+from gates import rederive_searched as module
+from gates.card.searched import FAILURE_SEARCH, SEARCHED
+from genpolicy.errors import RefusedError
+from genpolicy.evidence.documents.failures import FAILURE
+from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.rows.failures import SearchedRow
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.rows import read_rows, write_rows
+
+
+@pytest.fixture(scope="module")
+def params(kit):
+    changes = {
+        "stress": section(kit), "seed": ROOT_SEED, "task": {"name": "tabletop_insertion"},
+        "card": {"failure_search": EVALUATIONS},
+    }  # fmt: skip
+    return {**kit.PARAMS, **changes}
+
+
+@pytest.fixture(scope="module")
+def written(fleet, dataset, kit, tmp_path_factory):
+    root = tmp_path_factory.mktemp("ladder")
+    bench = make_bench(fleet, dataset, kit, tmp_path_factory.mktemp("made"))
+    write_searched(root / FAILURE_SEARCH, bench, kit)
+    return root, bench.watched[0].sha256
+
+
+@pytest.fixture
+def root(written, tmp_path, monkeypatch):
+    passed = SimpleNamespace(candidates={"flow": "PASS", "diffusion": "FAIL"})
+    monkeypatch.setattr(module, "read_report", lambda *_: (passed, ""))
+    pinned = {"flow": SimpleNamespace(checkpoint=written[1])}
+    monkeypatch.setattr(module, "CANDIDATES", SimpleNamespace(read=lambda _: pinned))
+    return shutil.copytree(written[0], tmp_path / "copy")
+
+
+def change(root, how):
+    """Write the table again with its second row changed."""
+    first, row, *others = read_rows(root / SEARCHED, SearchedRow)
+    write_rows(root / SEARCHED, SearchedRow, [first, *how(row), *others])
+
+
+def prove(root, params):
+    module.rederive_searched(root, params, rederive._held_to(params))
+
+
+def refused(root, params, match):
+    with pytest.raises(RefusedError, match=match):
+        prove(root, params)
+
+
+def test_what_the_stage_wrote_is_proved(root, params):
+    prove(root, params)
+
+
+def test_nothing_written_is_nothing_to_prove(tmp_path, params):
+    prove(tmp_path, params)
+
+
+@pytest.mark.parametrize(
+    ("how", "match"),
+    [
+        (lambda r: [replace(r, failed=not r.failed)], "failed"),
+        (lambda r: [replace(r, outcome="other")], "outcome"),
+        (lambda r: [replace(r, worth=0.9)], "worth"),
+        (lambda r: [replace(r, point=(0.5, *r.point[1:]))], "point"),
+        (lambda r: [replace(r, scene_start="{}")], "scene_start"),
+        (lambda r: [replace(r, start_sha256="0" * 64)], "start_sha256"),
+        (lambda r: [replace(r, severity=0.01)], "severity"),
+        (lambda r: [], "missing"),
+        (lambda r: [r, replace(r, start=7)], "without a search|only in"),
+    ],
+)
+def test_a_changed_row_is_refused(root, params, how, match):
+    change(root, how)
+    refused(root, params, match)
+
+
+def test_fewer_rollouts_than_planned_or_another_seed_are_refused(root, params):
+    refused(root, {**params, "card": {"failure_search": EVALUATIONS + 1}}, "missing")
+    refused(root, {**params, "seed": ROOT_SEED + 1}, "point")
+
+
+def test_a_failure_without_file_and_a_changed_file_are_refused(root, params):
+    first, *_ = sorted((root / FAILURE_SEARCH / "failures").iterdir())
+    stated = FAILURE.parse(read_json(first), where=first.name)
+    for changes in ({"severity": 0.5}, {"events_sha256": "0" * 64}, {"checkpoint": "0" * 64}):
+        write_bytes(first, canonical_json(FAILURE.plain(replace(stated, **changes))))
+        refused(root, params, next(iter(changes)))
+    first.unlink()
+    refused(root, params, first.name)
+
+
+def test_another_checkpoint_than_gate_b_pinned_is_refused(root, params, monkeypatch):
+    pinned = {"flow": SimpleNamespace(checkpoint="0" * 64)}
+    monkeypatch.setattr(module, "CANDIDATES", SimpleNamespace(read=lambda _: pinned))
+    refused(root, params, "as Gate B pinned it")
+
+
+def test_another_finding_of_the_checker_is_refused(root, params):
+    folder = root / FAILURE_SEARCH
+    stated = CHECKER.read(folder)
+    (folder / CHECKER.file).unlink()
+    CHECKER.write(folder, replace(stated, checked_actions=1))
+    refused(root, params, "checked_actions")
