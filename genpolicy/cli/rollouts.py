@@ -1,5 +1,6 @@
 """`genpolicy export rollout`: one rollout of Gate D, to be watched or shown."""
 
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -16,6 +17,8 @@ from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.journal_source import readable
 
 JOURNALS = Path("artifacts", "stress", "journals")
+FOUND, BY_SEARCH = Path("artifacts", "failure_search", "journals"), "@search"
+"""Where rollouts of the failure search lie, and what their conditions end in."""
 FORM = "METHOD/CONDITION/START"
 SAID_OF = 5
 """Journals that a message names."""
@@ -63,7 +66,7 @@ def run_export_rollout(
 
 
 def journal_of(rollout: str, root: Path) -> Path:
-    """The journal of Gate D that holds a rollout.
+    """The journal of Gate D, or of the failure search behind it, that holds a rollout.
 
     Raises:
         ConfigError: No name of a rollout.
@@ -72,14 +75,14 @@ def journal_of(rollout: str, root: Path) -> Path:
     method, _, rest = rollout.partition("/")
     condition, _, start = rest.partition("/")
     names = (method, condition, start)
-    if not all(name.replace("_", "").replace("-", "").isalnum() for name in names):
+    if not all(re.sub(r"[-_@.]", "", name).isalnum() for name in names):
         raise ConfigError(
             where="ROLLOUT",
             found=repr(rollout),
             expected=f"{FORM}, as `flow/push/0`",
             action="Name one; the first page names those that it shows.",
         )
-    folder = root / JOURNALS
+    folder = root / (FOUND if condition.endswith(BY_SEARCH) else JOURNALS)
     path = folder / f"{method}__{condition}.mcap"
     if not path.is_file():
         there = sorted(p.stem.replace("__", "/") for p in folder.glob("*__*.mcap"))
@@ -89,7 +92,7 @@ def journal_of(rollout: str, root: Path) -> Path:
         raise BadInputError(
             where=str(path),
             found="missing",
-            expected=f"a journal of Gate D; there {'are ' + some if there else 'is none'}",
+            expected=f"a journal in {folder.parent.name}; there {'are ' + some if there else 'is none'}",
             action=f"Name one of them with a start, as {there[0]}/0."
             if there
             else "Run `make ladder`: gate D has to be reached, "

@@ -65,7 +65,9 @@ def test_without_rerun_it_says_what_to_install(workspace, capsys, monkeypatch):
     assert "pip install 'genpolicy[rerun]'" in refused(capsys, code)
 
 
-@pytest.mark.parametrize("name", ["flow", "flow/push", "flow/push/0/1", "../push/0", "/a/b", ""])
+@pytest.mark.parametrize(
+    "name", ["flow", "flow/push", "flow/push/0/1", "../push/0", "flow/../0", "/a/b", ""]
+)
 def test_what_names_no_rollout_is_refused(workspace, capsys, name):
     line = refused(capsys, run(workspace, name, "--to", "gif", "--out", workspace / "x.gif"))
     assert "METHOD/CONDITION/START" in line and not (workspace / "x.gif").exists()
@@ -76,6 +78,20 @@ def test_a_journal_that_is_not_there_is_refused_with_those_that_are(workspace, t
     assert "act__push.mcap is missing" in line and "flow/push" in line
     line = refused(capsys, run(tmp_path / "none", ROLLOUT, "--to", "gif", "--out", workspace / "x"))
     assert "there is none" in line and "make ladder" in line
+
+
+def test_what_a_search_found_is_taken_from_where_it_lies(workspace, capsys):
+    journal = Journal("flow/push@search/0")
+    journal.add("session", 0, {"version": JOURNAL_VERSION, "labels": {"method": "flow"}})
+    journal.add("hold", 1_000_000_000, {"reason": "empty"})
+    journal.add("outcome", 1_000_000_000, {"outcome": "timed_out", "mode": ""})
+    place = "artifacts/failure_search/journals/flow__push@search.mcap"
+    write_journal(workspace / place, [journal])
+    out = workspace / "x.mcap"
+    assert run(workspace, "flow/push@search/0", "--to", "foxglove", "--out", out) == 0
+    capsys.readouterr()
+    line = refused(capsys, run(workspace, "act/push@search/0", "--to", "gif", "--out", out))
+    assert "act__push@search.mcap is missing" in line and "flow/push@search" in line
 
 
 def test_a_start_that_was_not_run_is_refused_with_those_that_were(workspace, capsys):
