@@ -92,7 +92,7 @@ def journal_of(rollout: str, root: Path) -> Path:
         raise BadInputError(
             where=str(path),
             found="missing",
-            expected=f"a journal in {folder.parent.name}; there {'are ' + some if there else 'is none'}",
+            expected=f"a journal of Gate D; there {'are ' + some if there else 'is none'}",
             action=f"Name one of them with a start, as {there[0]}/0."
             if there
             else "Run `make ladder`: gate D has to be reached, "
