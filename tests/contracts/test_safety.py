@@ -336,25 +336,6 @@ def test_no_criterion_of_gate_d_reaches_a_monitor(judge: str) -> None:
     )
 
 
-SEARCHES = ("genpolicy.evidence.failure_search", "genpolicy.evidence.rows.failures",
-            "genpolicy.evidence.documents.failures", "gates.card", "stages")  # fmt: skip
-
-
-@pytest.mark.parametrize("judge", [*JUDGES, "gates/stress/gate.py"])
-def test_nothing_of_gate_d_reaches_what_a_search_for_failures_found(judge: str) -> None:
-    """Found failures count in no promotion test: neither criteria nor choice can see them."""
-    found = reached(ROOT / judge)
-    near = tuple(f"{name}." for name in SEARCHES)
-    assert sorted(name for name in found if f"{name}.".startswith(near)) == []
-    text = "".join((ROOT / name).read_text() for name in (judge, "gates/stress/rollouts.py"))
-    assert "failure_search" not in text
-
-
-def test_ways_to_what_a_search_found_are_followed() -> None:
-    assert "gates.card.searched" in reached(ROOT / "gates/card/judge.py")
-    assert "genpolicy.evidence.rows.failures" in reached(ROOT / "gates/card/drafting.py")
-
-
 def test_ways_to_a_monitor_are_followed() -> None:
     found = reached(ROOT / "gates/stress/gate.py")
     assert {"gates.stress.monitors", "genpolicy.monitors.names"} <= found
