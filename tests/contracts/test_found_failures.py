@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from test_safety import JUDGES, ROOT, reached
 
 SEARCHES = ("genpolicy.evidence.failure_search", "genpolicy.evidence.rows.failures",
-            "genpolicy.evidence.documents.failures", "gates.card", "stages")  # fmt: skip
+            "genpolicy.evidence.documents.failures", "gates.card.searched", "stages")  # fmt: skip
 
 
 @pytest.mark.parametrize("judge", [*JUDGES, "gates/stress/gate.py"])
