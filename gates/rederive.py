@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gates.card.searched import FAILURE_SEARCH
 from gates.pages.printing import differing
 from gates.proof import Rung
 from gates.rederive_brought import rederive_brought
@@ -124,7 +125,7 @@ def _evidence(root: Path, gate: Gate) -> None:
         rederive_brought(root, params)
         rederive_conformance(root, params)
         rederive_costs(root, trainings(root, gate, params))
-    if gate == "E":
+    if gate == "E" and (root / FAILURE_SEARCH).is_dir():
         rederive_searched(root, params, _held_to(params))
     if gate not in FOLDERS:
         return

@@ -55,7 +55,7 @@ CLOSE = 1e-6
 def rederive_searched(
     root: Path, params: Mapping[str, Any], held_to: tuple[ExpectedSettings, ExpectedMotion]
 ) -> None:
-    """Hold what the card says of the failure search against its journals; nothing where none ran.
+    """Hold what the card says of the failure search against its journals.
 
     Args:
         root: Root of the workspace.
@@ -69,8 +69,6 @@ def rederive_searched(
         BadInputError: A file cannot be read.
     """
     folder = root / FAILURE_SEARCH
-    if not folder.is_dir():
-        return
     rows = read_rows(root / SEARCHED, SearchedRow)
     journals = sorted((folder / JOURNALS).glob("*.mcap"))
     with readable(f"{FAILURE_SEARCH}/{JOURNALS}"):

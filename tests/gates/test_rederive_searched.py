@@ -11,7 +11,7 @@ from _searched import EVALUATIONS, make_bench, section, write_searched
 from gates import rederive
 from gates import rederive_searched as module
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
-from genpolicy.errors import RefusedError
+from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.documents.failures import FAILURE
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.rows.failures import SearchedRow
@@ -66,7 +66,11 @@ def test_what_the_stage_wrote_is_proved(root, params):
 
 
 def test_nothing_written_is_nothing_to_prove(tmp_path, params):
-    prove(tmp_path, params)
+    (tmp_path / "params.yaml").write_bytes(canonical_json(params))
+    rederive.rederive(tmp_path, "E")
+    (tmp_path / FAILURE_SEARCH).mkdir(parents=True)
+    with pytest.raises(BadInputError, match=r"searched\.parquet"):
+        rederive.rederive(tmp_path, "E")
 
 
 @pytest.mark.parametrize(
