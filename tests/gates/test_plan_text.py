@@ -4,10 +4,11 @@ from gates.plan_text import plan_text
 from gates.planning import Bound, Gain, Plan, Stated
 
 
-def made(*bounds, gains=(), needed=77, graded=0, probed=0, weighed=""):
+def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed=""):
     return Plan(
         starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
-        rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed, longest_s=63_000.0,
+        rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed,
+        searched_rollouts=searched, longest_s=63_000.0,
         measure="utility" if weighed else "success", weighed=weighed, margin=0.05, alpha=0.0125,
         power=0.8, stated=Stated(0.5, 0.8, 0.86, needed, 0.4 if weighed else None), bounds=bounds,
         gains=gains,
@@ -53,10 +54,11 @@ def test_a_plan_that_can_be_decided_warns_of_nothing():
 
 
 def test_what_is_run_beside_the_comparison_is_said_apart():
-    lines = plan_text(made(graded=5_400, probed=176)).splitlines()
+    lines = plan_text(made(graded=5_400, probed=176, searched=1_920)).splitlines()
     assert lines[1:4] == [
         "5,400 beside them of graded sizes (stress.severities),",
         "up to 176 after them for the monitors (monitors),",
+        "up to 1,920 behind the gate for failures (card.failure_search),",
         "at most 17.5 h of virtual time",
     ]
 

@@ -152,7 +152,10 @@ def test_rollouts_and_time_are_those_of_methods_conditions_and_starts(planned):
     methods = {*params["train_generators"]["samplers"], *params["stress"]["baselines"]}
     plan = planned(starts=90, episode_limit_s=6.0)
     assert plan.rollouts == len(methods) * len(params["stress"]["perturbations"]) * 90
-    assert plan.longest_s == (plan.rollouts + plan.probe_rollouts) * 6.0
+    searched = len(plan.candidates) * len(params["stress"]["perturbations"])
+    assert plan.searched_rollouts == searched * params["card"]["failure_search"] > 0
+    beside = plan.probe_rollouts + plan.searched_rollouts
+    assert plan.longest_s == (plan.rollouts + beside) * 6.0
 
 
 def test_what_is_graded_and_what_is_probed_is_counted_apart(planned):
@@ -172,7 +175,8 @@ def test_what_is_graded_and_what_is_probed_is_counted_apart(planned):
     assert plan.rollouts == plan.methods * len(plan.conditions) * 90
     assert plan.graded_rollouts == plan.methods * 3 * 90
     assert plan.probe_rollouts == len(plan.candidates) * (11 + 7 + 3 * 5)
-    assert plan.longest_s == 6.0 * (plan.rollouts + plan.graded_rollouts + plan.probe_rollouts)
+    beside = plan.graded_rollouts + plan.probe_rollouts + plan.searched_rollouts
+    assert plan.longest_s == 6.0 * (plan.rollouts + beside)
     for off in ({}, {**monitors, "kinds": []}, {**monitors, "probes": {}}):
         bare = planned(starts=90, monitors=off)
         assert (bare.graded_rollouts, bare.probe_rollouts) == (0, 0)
