@@ -55,7 +55,7 @@ def test_a_plan_that_can_be_decided_warns_of_nothing():
 
 def test_what_is_run_beside_the_comparison_is_said_apart():
     lines = plan_text(made(graded=5_400, probed=176, searched=1_920)).splitlines()
-    assert lines[1:4] == [
+    assert lines[1:5] == [
         "5,400 beside them of graded sizes (stress.severities),",
         "up to 176 after them for the monitors (monitors),",
         "up to 1,920 behind the gate for failures (card.failure_search),",
