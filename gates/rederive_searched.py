@@ -120,15 +120,16 @@ def _asked_again(
                     if len(stated.point) != len(one.point) or not near:
                         limit = f"{one.point}, which the search asks for"
                         refuse("E", f"{SEARCHED}: {key}: point", f"{stated.point}", limit)
-                    worth = worth_of(
+                    row = _row(task, condition, stated, end)
+                    row["worth"] = worth_of(
                         condition,
                         end,
-                        stated.severity,
+                        row["severity"],
                         episode_limit_s=settings.episode_limit_s,
                         execution=execution,
                     )
-                    found.append(_row(task, condition, stated, end, worth))
-                    worths.append(worth)
+                    found.append(row)
+                    worths.append(row["worth"])
                 return worths
 
             search_with(
@@ -143,7 +144,7 @@ def _asked_again(
 
 
 def _row(
-    task: Task, condition: Condition, stated: SearchedRow, end: Mapping[str, Any], worth: float
+    task: Task, condition: Condition, stated: SearchedRow, end: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The row of a rollout from its point and its journal; the world is made again."""
     (asked,) = asked_for(task, condition, [np.array(stated.point)], first=stated.start)
@@ -161,7 +162,6 @@ def _row(
         "most": condition.most if condition.sizes else None,
         "outcome": end["outcome"],
         "failed": not end["success"],
-        "worth": worth,
     }
 
 

@@ -36,7 +36,7 @@ def test_a_bad_budget_is_bad_input(workspace, edit, beside, monkeypatch, value):
     edit(workspace, lambda params: params["card"].update(failure_search=value))
     code, said = beside()
     assert (code, said.count("\n")) == (2, 1)
-    assert said.startswith("failure_search: params.yaml: card: failure_search")
+    assert said.startswith("failure_search: params.yaml: card.failure_search")
     assert not (workspace / ARTIFACTS / "failure_search").exists()
 
 
@@ -59,7 +59,8 @@ def test_who_gate_d_does_not_let_through_is_not_searched(evidence, monkeypatch, 
     monkeypatch.setattr(
         module, "write_searches", lambda _, searches, **__: written.append(list(searches))
     )
-    params = load_params()
+    found = load_params()
+    params = replace(found, raw={**found.raw, "card": {"failure_search": 60}})
     module.work(params)
     assert (tuple(asked), written) == (passed, [["x"]])
     nobody = replace(params, raw={**params.raw, "card": {"failure_search": 0}})

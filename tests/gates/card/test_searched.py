@@ -106,4 +106,4 @@ def test_the_page_of_gate_e_lists_every_condition(team, rows):
     assert first[5] == "force_stop, failures/flow__camera_delay@search__2.json"
     plant(team.root, rows[:1])
     with pytest.raises(MissingEvidenceError, match="not the file that the report names"):
-        FOUND.read(evidence, report)
+        FOUND.read(Evidence(team.root), report)
