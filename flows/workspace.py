@@ -83,7 +83,7 @@ def merged(
         if key in (WAIVED, ANSWERED) and isinstance(base.get(LIMITS), Mapping):
             result[key] = value
             continue
-        if key not in base:
+        if base and key not in base:  # a section that stands empty is all defaults of its stage
             raise ConfigError(
                 where=f"override {place}",
                 found="not a key of params.yaml",

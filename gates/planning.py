@@ -176,7 +176,7 @@ def plan_of(root: Path) -> Plan:
     rollouts = of_condition * len(planned.perturbations)
     graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
     probed = len(settings.candidates) * section(params, "monitors", MonitorsSettings).rollouts
-    looks = search_settings(params).failure_search * len(planned.perturbations)
+    looks = search_settings(params).evaluations * len(planned.perturbations)
     searched = len(settings.candidates) * looks
     power = limits.number(REACHABLE, otherwise=POWER)
     table = power_document(

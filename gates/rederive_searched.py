@@ -94,7 +94,7 @@ def _asked_again(
     ended: Sequence[Mapping[str, Any]],
 ) -> list[dict[str, Any]]:
     """Every row as the searches that are planned give it, by what the journals say."""
-    evaluations = search_settings(params).failure_search
+    evaluations = search_settings(params).evaluations
     settings = section(params, "stress", StressSettings)
     passed = [
         name for name, verdict in read_report(root, "D")[0].candidates.items() if verdict == "PASS"

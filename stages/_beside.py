@@ -17,7 +17,8 @@ from genpolicy.errors import GenpolicyError
 from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
 from stages._stage import TIMES, Params, _record, _taken, load_params
 
-BESIDE = ("failure_search",)
+BESIDE = {"failure_search": "card.failure_search"}
+"""Their names, and where in `params.yaml` their settings stand."""
 
 
 def main(name: str, work: Callable[[Params], None]) -> NoReturn:

@@ -42,7 +42,7 @@ from stages._stage import ARTIFACTS, Params
 def work(params: Params) -> None:
     """Admit through gate D, then search every condition for failures of whoever passed it."""
     admitted = admit("failure_search", Path.cwd()).candidates
-    looks = search_settings(params.raw).failure_search > 0
+    looks = search_settings(params.raw).evaluations > 0
     with output_folder(ARTIFACTS / "failure_search") as folder:
         write_searches(
             folder,
@@ -54,7 +54,7 @@ def work(params: Params) -> None:
 
 def planned(params: Params, candidates: Sequence[str], *, journals: Path) -> list[Searching]:
     """Every search of these candidates, under what the comparison ran under."""
-    evaluations = search_settings(params.raw).failure_search
+    evaluations = search_settings(params.raw).evaluations
     require_one_contract("train_generators", dataset=False)
     section = params.section("stress", StressSettings)
     seed = params.section("policy", PolicySettings).seeds[0]

@@ -23,7 +23,7 @@ from gates.overrides import is_said
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
-from genpolicy.evidence.failure_search.settings import MOST_EVALUATIONS
+from genpolicy.evidence.failure_search.settings import SearchSettings
 from genpolicy.integrity.documents import canonical_json, parse_json
 
 CARD_SCHEMA_VERSION = 3
@@ -64,8 +64,7 @@ class CardSettings(GateSettings):
     Attributes:
         name: File name of the signed card: `cards/<name>.dsse.json`.
         authors: Who made the candidate, by identifier on the allow-list; they sign nothing.
-        failure_search: Rollouts in which failures are searched for before the draft, of each
-            candidate in each condition.
+        failure_search: How long failures are searched for before the draft.
         task: Name of the task.
     """
 
@@ -73,7 +72,7 @@ class CardSettings(GateSettings):
 
     name: CardName
     authors: tuple[PersonId, ...]
-    failure_search: int = Field(default=0, ge=0, le=MOST_EVALUATIONS)
+    failure_search: SearchSettings = Field(default_factory=SearchSettings)
     task: str = Field(min_length=1)
 
 

@@ -33,7 +33,7 @@ def _listed(evidence: Evidence, report: GateReport) -> Table:
     require_bound(evidence, report, SEARCHED)
     found = searched(evidence.root)
     if not found:
-        raise MissingEvidenceError("nobody looked: card.failure_search is 0")
+        raise MissingEvidenceError("nobody looked: card.failure_search.evaluations is 0")
     return (HEADS, *map(_line, found))
 
 

@@ -24,7 +24,7 @@ from genpolicy.integrity.rows import read_rows, write_rows
 def params(kit):
     changes = {
         "stress": section(kit), "seed": ROOT_SEED, "task": {"name": "tabletop_insertion"},
-        "card": {"failure_search": EVALUATIONS},
+        "card": {"failure_search": {"evaluations": EVALUATIONS}},
     }  # fmt: skip
     return {**kit.PARAMS, **changes}
 
@@ -93,7 +93,9 @@ def test_a_changed_row_is_refused(root, params, how, match):
 
 
 def test_fewer_rollouts_than_planned_or_another_seed_are_refused(root, params):
-    refused(root, {**params, "card": {"failure_search": EVALUATIONS + 1}}, "missing")
+    refused(
+        root, {**params, "card": {"failure_search": {"evaluations": EVALUATIONS + 1}}}, "missing"
+    )
     refused(root, {**params, "seed": ROOT_SEED + 1}, "point")
 
 

@@ -33,7 +33,7 @@ def test_it_refuses_where_no_gate_was_judged(workspace, beside):
 @pytest.mark.parametrize("value", [-1, 1.5, "many"])
 def test_a_bad_budget_is_bad_input(workspace, edit, beside, monkeypatch, value):
     monkeypatch.setattr(module, "admit", lambda *_: type("A", (), {"candidates": ("flow",)}))
-    edit(workspace, lambda params: params["card"].update(failure_search=value))
+    edit(workspace, lambda params: params["card"].update(failure_search={"evaluations": value}))
     code, said = beside()
     assert (code, said.count("\n")) == (2, 1)
     assert said.startswith("failure_search: params.yaml: card.failure_search")
@@ -60,10 +60,10 @@ def test_who_gate_d_does_not_let_through_is_not_searched(evidence, monkeypatch, 
         module, "write_searches", lambda _, searches, **__: written.append(list(searches))
     )
     found = load_params()
-    params = replace(found, raw={**found.raw, "card": {"failure_search": 60}})
+    params = replace(found, raw={**found.raw, "card": {"failure_search": {}}})
     module.work(params)
     assert (tuple(asked), written) == (passed, [["x"]])
-    nobody = replace(params, raw={**params.raw, "card": {"failure_search": 0}})
+    nobody = replace(params, raw={**params.raw, "card": {"failure_search": {"evaluations": 0}}})
     asked.clear()
     module.work(nobody)
     assert (asked, written[-1]) == ([], []), "0 looks for nothing"

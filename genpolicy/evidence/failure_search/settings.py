@@ -6,9 +6,13 @@ from typing import Any
 from pydantic import Field
 
 from genpolicy.contract.settings import Settings, parse_settings
+from genpolicy.errors import ConfigError
 
 HOME, KEY = "card", "failure_search"
 """Section and key of `params.yaml`; the search stands between Gate D and the card."""
+EVALUATIONS = 60
+"""Six generations in nine dimensions: enough to go downhill, and of eight conditions two thirds of
+what the comparison costs for one method."""
 MOST_EVALUATIONS = 10_000
 """More rollouts of one condition than any ladder runs: beyond it a typing error."""
 FIRST_SPREAD = 0.3
@@ -20,23 +24,30 @@ condition has a size of nothing, which would be another one."""
 
 
 class SearchSettings(Settings):
-    """What of the section `card` the search reads.
+    """Section `card.failure_search`.
 
     Attributes:
-        failure_search: Rollouts of each candidate in each condition; 0: nobody looks, and the card
+        evaluations: Rollouts of each candidate in each condition; 0: nobody looks, and the card
             says so. Fixed before anything is run: a search never goes on because it found nothing.
     """
 
-    failure_search: int = Field(default=0, ge=0, le=MOST_EVALUATIONS)
+    evaluations: int = Field(default=EVALUATIONS, ge=0, le=MOST_EVALUATIONS)
 
 
 def search_settings(raw: Mapping[str, Any]) -> SearchSettings:
     """From the whole of `params.yaml`.
 
     Raises:
-        ConfigError: No whole number, or out of its range.
+        ConfigError: No section, an unknown key, no whole number, or out of its range.
     """
     section = raw.get(HOME)
-    given = section if isinstance(section, dict) else {}
-    wanted = {KEY: given[KEY]} if KEY in given else {}
-    return parse_settings(SearchSettings, wanted, where=f"params.yaml: {HOME}")
+    given = section.get(KEY, {}) if isinstance(section, dict) else {}
+    where = f"params.yaml: {HOME}.{KEY}"
+    if not isinstance(given, dict):
+        raise ConfigError(
+            where=where,
+            found=repr(given)[:80],
+            expected="a section, as {evaluations: 60}",
+            action="Correct this setting.",
+        )
+    return parse_settings(SearchSettings, given, where=where)

@@ -61,7 +61,7 @@ class Chosen:
             where=f"task {self._task}: sample_start",
             found=found,
             expected="uniform draws, as many for every start, for the failure search to choose",
-            action="Draw by `uniform` or `random`, or set card.failure_search to 0.",
+            action="Draw by `uniform` or `random`, or set card.failure_search.evaluations to 0.",
         )
 
 
