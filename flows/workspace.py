@@ -83,7 +83,10 @@ def merged(
         if key in (WAIVED, ANSWERED) and isinstance(base.get(LIMITS), Mapping):
             result[key] = value
             continue
-        if base and key not in base:  # a section that stands empty is all defaults of its stage
+        if not base:  # a section that stands empty has its defaults in code, which know its keys
+            result[key] = value
+            continue
+        if key not in base:
             raise ConfigError(
                 where=f"override {place}",
                 found="not a key of params.yaml",

@@ -206,4 +206,4 @@ def _files(
 
 def _checkpoint(events: Sequence[Event]) -> object:
     """Whose answers a session allows."""
-    return next((one.payload["checkpoint"] for one in events if one.kind == "active"), None)
+    return next((one.payload.get("checkpoint") for one in events if one.kind == "active"), None)

@@ -17,6 +17,10 @@ def test_only_the_overridden_leaf_changes() -> None:
     assert merged(base, {}) == base
 
 
+def test_a_section_that_stands_empty_takes_keys_that_its_stage_knows() -> None:
+    assert merged({"a": {"z": {}}}, {"a": {"z": {"n": 2}}}) == {"a": {"z": {"n": 2}}}
+
+
 @pytest.mark.parametrize(
     ("overrides", "place"),
     [
