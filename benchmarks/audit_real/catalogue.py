@@ -10,6 +10,7 @@ from benchmarks.audit_real.changes.columns import COLUMN_CHANGES, DECIDED
 from benchmarks.audit_real.changes.defects import DEFECTS
 from benchmarks.audit_real.changes.forms import FORMS
 from benchmarks.audit_real.changes.more import MORE
+from benchmarks.audit_real.changes.said import SAID
 from benchmarks.audit_real.changes.time import TIMES
 from benchmarks.audit_real.plan import Plan
 from benchmarks.audit_real.recording import Recording
@@ -36,7 +37,8 @@ BASES: dict[str, Callable[[Plan], Recording]] = {
     **({"pusht": real.pusht, "g1": real.g1} if real.here() else {}),
 }
 CHANGES: dict[str, Change] = {
-    change.name: change for change in (*FORMS, *DECIDED, *COLUMN_CHANGES, *TIMES, *DEFECTS, *MORE)
+    change.name: change
+    for change in (*FORMS, *DECIDED, *COLUMN_CHANGES, *TIMES, *DEFECTS, *MORE, *SAID)
 }
 # Two changes at once: a defect beside what decides, a form beside either, names beside all.
 CROSSINGS = (

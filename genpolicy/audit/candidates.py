@@ -7,13 +7,13 @@ another in every episode names the episode and cannot be its reason.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from genpolicy.audit.data import NOT_RECORDED, Array, AuditInput, Integers, recorded
+from genpolicy.audit.parts import Columns, number_of, parts
 from genpolicy.audit.variable import Values, Variable, numbered
 from genpolicy.data.variables import Runs, stored
 
@@ -25,9 +25,6 @@ COUNTED_THROUGH = 1.5
 SHARED = 0.5
 IDENTIFIERS = {"uuid", "id", "index", "idx", "number", "seed", "hash", "name", "count", "counter"}
 ENDS = re.compile(r"_?(index|idx|id|uuid|number|code)$", re.IGNORECASE)
-CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
-# Dates of several days are also asked by their time of day, where it varies by so many seconds.
-TIME_OF_DAY, HOUR_S = "time of day", 3600.0
 # What the audit itself calls a variable; a column of that name is told apart.
 RESERVED = {
     *("phase", "episode_order", "time_in_episode", "recording_sequence", "history"),
@@ -44,7 +41,6 @@ FILLED_IN_TURN = ("lerobot",)
 EVERY_EPISODE = "another value in nearly every episode: it names the episode"
 COUNTED = "whole numbers, another in every episode: it counts or names the episodes"
 SAME_AS_OUTCOME = "says the same as the outcome"
-Columns = dict[str, list[Runs | None]]
 
 
 @dataclass(frozen=True)
@@ -85,20 +81,20 @@ def candidates(table: pd.DataFrame, manifest: Mapping[str, object], data: AuditI
     found: list[Variable] = []
     left: list[tuple[str, str]] = []
     columns = _columns(table, manifest)
-    for name, runs in {**_times_of_day(columns), **columns}.items():
+    for name, runs in {**parts(columns, without=PLACES), **columns}.items():
         made = _variable(name, [runs[number] for number in order], data)
         if isinstance(made, Variable):
             found.append(made)
         elif made:
             left.append((name, made))
-    return _distinct(found, left, data, _phase_name(manifest))
+    return _distinct(found, left, data, _recorded_name(manifest, "phase"))
 
 
 def _columns(table: pd.DataFrame, manifest: Mapping[str, object]) -> Columns:
     """The stored columns, the task, and where each episode came from."""
     found = stored(table)
     if TASK in table:
-        found.setdefault(TASK, _whole(table[TASK].tolist()))
+        found.setdefault(_recorded_name(manifest, TASK), _whole(table[TASK].tolist()))
     if "source_file" in table and manifest.get("source_kind") not in FILLED_IN_TURN:
         files = [str(text).split("#")[0] for text in table["source_file"]]
         folders = [text.rpartition("/")[0] for text in files]
@@ -108,31 +104,6 @@ def _columns(table: pd.DataFrame, manifest: Mapping[str, object]) -> Columns:
         called = [NUMBER.sub("", text.rpartition("/")[2]) for text in files]
         found.setdefault(CALLED, _whole(called))
     return found
-
-
-def _times_of_day(columns: Columns) -> Columns:
-    """Columns of dates by their time of day: what is done in the mornings, whatever the date."""
-    found: Columns = {}
-    for name, runs in columns.items():
-        kept = [item for item in runs if item is not None]
-        texts = {str(value).strip() for item in kept for value in item.values}
-        moments = {text: _moment(text) for text in texts if text.lower() not in NOT_RECORDED}
-        dates = [moment for moment in moments.values() if moment is not None]
-        seconds = [_second(moment) for moment in dates]
-        if len(dates) < len(moments) or len({moment.date() for moment in dates}) < 2:
-            continue
-        if max(seconds) - min(seconds) >= HOUR_S:
-            said = {text: str(moment.time()) for text, moment in moments.items() if moment}
-            found[f"{name} ({TIME_OF_DAY})"] = [
-                item and Runs(item.rows, tuple(said.get(str(v).strip(), "") for v in item.values))
-                for item in runs
-            ]
-    return found
-
-
-def _second(moment: datetime) -> float:
-    """Second of the day."""
-    return (moment - moment.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
 
 
 def _whole(values: Sequence[object]) -> list[Runs | None]:
@@ -177,34 +148,11 @@ def _numbers(texts: NDArray[np.object_], known: NDArray[np.bool_]) -> Array | No
     result = np.full(len(texts), np.nan)
     for number, text in enumerate(texts.tolist()):
         if known[number]:
-            value = text if isinstance(text, float) else _number(text.strip())
+            value = text if isinstance(text, float) else number_of(text.strip())
             if value is None or not np.isfinite(value):
                 return None
             result[number] = value
     return result
-
-
-def _number(text: str) -> float | None:
-    """A number, a truth value, a time of day in s, or a date in s since 1970."""
-    if text.lower() in ("true", "false"):
-        return float(text.lower() == "true")
-    try:
-        return float(text)
-    except ValueError:
-        pass
-    clock = CLOCK.fullmatch(text)
-    if clock is not None:
-        return int(clock[1]) * 3600.0 + int(clock[2]) * 60.0 + float(clock[3] or 0.0)
-    moment = _moment(text)
-    return None if moment is None else (moment - datetime(1970, 1, 1)).total_seconds()
-
-
-def _moment(text: str) -> datetime | None:
-    """A date, by the clock that its recorder had."""
-    try:
-        return datetime.fromisoformat(text).replace(tzinfo=None)
-    except ValueError:
-        return None
 
 
 def _is_counted(name: str, numbers: Array) -> bool:
@@ -291,9 +239,9 @@ def _meaning(name: str) -> tuple[bool, bool, int, str]:
     return name in PLACES, ENDS.search(name) is not None, len(name), name
 
 
-def _phase_name(manifest: Mapping[str, object]) -> str:
-    """What the recordings called the phase."""
+def _recorded_name(manifest: Mapping[str, object], label: str) -> str:
+    """What the recordings called a label."""
     contract = manifest.get("import_contract")
     labels = contract.get("labels") if isinstance(contract, dict) else None
-    name = labels.get("phase") if isinstance(labels, dict) else None
-    return str(name or "phase")
+    name = labels.get(label) if isinstance(labels, dict) else None
+    return str(name or label)

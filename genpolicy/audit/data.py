@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.angles import without_jumps
 from genpolicy.audit.forms import Forms, before, in_place
 from genpolicy.audit.variable import Variable
 from genpolicy.errors import ContractError, NonFiniteError
@@ -157,9 +158,23 @@ class AuditInput:
     @cached_property
     def placed(self) -> Array:
         """The action with every number as a place (canonical order). Shape (N, D_a)."""
-        if self.forms is None:
-            return self.action
-        return in_place(self.action, self.observation, self.episode, self.forms)
+        action = self.action
+        if self.forms is not None:
+            action = in_place(action, self.observation, self.episode, self.forms)
+        return without_jumps(action, self.episode, self._alone)
+
+    @property
+    def _alone(self) -> Integers:
+        """Places that no observed number is held against: angles among them may jump."""
+        columns = np.arange(self.action.shape[1])
+        alone = np.ones(len(columns), dtype=bool)
+        if self.paired:
+            alone[self.action_position] = False
+        if self.action_rotation is not None:
+            alone[self.action_rotation] = False
+        if self.forms is not None:
+            alone &= ~self.forms.added
+        return np.asarray(columns[alone])
 
     @property
     def grouping(self) -> Text:

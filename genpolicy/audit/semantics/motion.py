@@ -4,14 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from genpolicy.audit.angles import SMALL_STEP, TURN_TOLERANCE, TURNS
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.semantics.directions import directional, one_sign
 from genpolicy.audit.semantics.robust import episode_medians
 
-TURNS = (2.0 * np.pi, 360.0)  # rad, degrees
-# A wrapped angle spans its turn, within this share, and steps either little or nearly by a turn.
-TURN_TOLERANCE = 0.1
-SMALL_STEP = 0.35
 # A splice is a step this many times as large as the fast steps of all motion, and as its
 # neighbours: a fast motion is fast in its neighbours too.
 SPLICE_STEP = 5.0

@@ -57,6 +57,7 @@ def propose_commands(
     )
     known = [units[name] for name in names]
     reading = _with_turns(reading, turned(channels, sample), commanded, sample, period_s=period_s)
+    reading = _whole_rotations(reading, commanded)
     told = _with_units(action, reading, known, period_s)
     pairs = {
         a: o
@@ -99,11 +100,26 @@ def _observed(
     begin = 0
     for channel in plain:
         width = len(channel.components)
-        for first in range(begin, begin + width - 3):
-            if is_quaternion(values[:, first : first + 4]):
-                parts += range(first, first + 4)
+        parts += [begin + part for part in _of_rotations(values[:, begin : begin + width])]
         begin += width
-    return names, units, values, sorted(set(parts))
+    return names, units, values, parts
+
+
+def _of_rotations(values: Array) -> list[int]:
+    """Columns that are parts of a quaternion."""
+    found: set[int] = set()
+    for first in range(values.shape[1] - 3):
+        if is_quaternion(values[:, first : first + 4]):
+            found |= set(range(first, first + 4))
+    return sorted(found)
+
+
+def _whole_rotations(reading: Reading, commanded: Array) -> Reading:
+    """A commanded quaternion says where, whatever one of its parts alone seems to change."""
+    parts = set(_of_rotations(commanded))
+    forms = [CommandForm() if a in parts else form for a, form in enumerate(reading.forms)]
+    pairs = {a: o for a, o in reading.pairs.items() if a not in parts}
+    return replace(reading, forms=tuple(forms), pairs=pairs)
 
 
 def _with_turns(

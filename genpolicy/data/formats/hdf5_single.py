@@ -11,13 +11,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.data.formats.leaves import MAXIMUM_TEXT, leaves
 from genpolicy.data.formats.source import Also, Column, refuse
 
 OBSERVATIONS = "obs"
 # Filters of the library itself: deflate, shuffle, fletcher32, szip, nbit, scale-offset, lzf.
 FILTERS = (1, 2, 3, 4, 5, 6, 32000)
 REWRITE = "Write the file again with plain, internal data sets (h5repack)."
-MAXIMUM_TEXT = 200
 
 
 def read_single(
@@ -44,10 +44,10 @@ def read_single(
         if name in read or name in wide or not also(Column(name, None)):
             continue
         if data.ndim == 1 and len(data) == rows and rows > 1:
-            by_row[name] = _texts(data) if data.dtype.kind in "SO" else np.asarray(data[...])
+            by_row[name] = _texts(data, MAXIMUM_TEXT) if _is_text(data) else np.asarray(data[...])
         elif data.size == 1:
-            values = _texts(data) if data.dtype.kind in "SO" else np.asarray(data[...])
-            single[name] = str(values.reshape(-1)[0])[:MAXIMUM_TEXT]
+            values = _texts(data) if _is_text(data) else np.asarray(data[...])
+            single |= leaves(name, str(values.reshape(-1)[0]))
     return by_row, single
 
 
@@ -71,10 +71,14 @@ def _is_own(data: Any) -> bool:
     return (text or data.dtype.kind in "fiub") and foreign(data) is None
 
 
-def _texts(data: Any) -> NDArray[Any]:
+def _is_text(data: Any) -> bool:
+    return data.dtype.kind in "SO"
+
+
+def _texts(data: Any, longest: int | None = None) -> NDArray[Any]:
     values = np.asarray(data[...]).reshape(-1)
     texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in values]
-    return np.array([text[:MAXIMUM_TEXT] for text in texts], dtype=object)
+    return np.array([text[:longest] for text in texts], dtype=object)
 
 
 def member(group: Any, name: str, where: str) -> Any:

@@ -6,7 +6,10 @@ changes from row to row is a signal, and what counts rows or judges the episode 
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from genpolicy.data.formats.contract import ImportContract, selectors
+from genpolicy.data.formats.leaves import leaves
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.units import tokens
 from genpolicy.data.variables import Recorded, Runs, runs_of, varying
@@ -63,6 +66,9 @@ class Reasons:
         for name, values in raw.columns.items():
             if values.ndim != 1 or not len(values) or not self.wants(Column(name, None)):
                 continue
+            if isinstance(values[0], str) and np.all(values == values[0]):
+                self._keep(name, values[0], uuid)
+                continue
             runs = runs_of(values)
             if len(runs.rows) > max(2, len(values) // SHORTEST_RUN):
                 self._flickering[name] = self._flickering.get(name, 0) + 1
@@ -70,7 +76,13 @@ class Reasons:
                 self._runs.setdefault(name, {})[uuid] = runs
         for name, text in raw.attributes.items():
             if name not in raw.columns and self.wants(Column(name, None)):
-                self._runs.setdefault(name, {})[uuid] = Runs((0,), (text,))
+                self._keep(name, text, uuid)
+
+    def _keep(self, name: str, text: str, uuid: str) -> None:
+        """What holds for an episode; part by part, where it was written as one JSON object."""
+        for part, said in leaves(name, text).items():
+            if part == name or self.wants(Column(part, None)):
+                self._runs.setdefault(part, {})[uuid] = Runs((0,), (said,))
 
     def recorded(self) -> Recorded:
         """What varies; a value that is the same everywhere tells nothing."""

@@ -24,6 +24,7 @@ from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import only_hdf5
 from genpolicy.data.formats.hdf5_single import REWRITE, check_storage, member, read_single
+from genpolicy.data.formats.leaves import MAXIMUM_TEXT, leaves
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     MAXIMUM_VALUE_BYTES,
@@ -41,6 +42,7 @@ DATA, OBSERVATIONS, MASK = "data", "obs", "mask"
 ACTIONS = "actions"
 PER_ROW = ("actions", "rewards", "dones")
 MAXIMUM_ATTRIBUTE = 1 << 20
+MARKUP = "<"  # the XML of a simulator's model
 HASH_BYTES = 1 << 20
 READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
 
@@ -229,7 +231,7 @@ def _columns(demo: Any, where: str) -> tuple[list[Column], set[str], list[str]]:
 
 
 def _attributes(group: Any) -> dict[str, str]:
-    """Short scalar attributes as text; models and states of a simulator are left out."""
+    """Scalar attributes as text; of a long one its parts, and no model of a simulator."""
     result: dict[str, str] = {}
     for name in sorted(group.attrs):
         value = group.attrs[name]
@@ -237,8 +239,10 @@ def _attributes(group: Any) -> dict[str, str]:
             value = value.decode("utf-8", errors="replace")
         if isinstance(value, str | bool | int | float | np.number | np.bool_):
             text = str(value)
-            if len(text) <= 200 and name != "num_samples":
+            if len(text) <= MAXIMUM_TEXT and name != "num_samples":
                 result[str(name)] = text
+            elif name != "num_samples" and not text.lstrip().startswith(MARKUP):
+                result |= leaves(str(name), text)
     return result
 
 

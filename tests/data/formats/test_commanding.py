@@ -70,6 +70,19 @@ def test_parts_of_a_rotation_are_no_partners_and_turns_are_changes():
         assert abs(found.forms[name].gain - 0.1) < 0.01
 
 
+def test_a_commanded_quaternion_is_a_place_whatever_its_parts_seem_to_change():
+    def written(path):
+        # One part grows as fast as the hand goes: it would be read as its speed.
+        speed = np.diff(path[:, 0], prepend=path[0, 0]) / 0.05
+        return np.concatenate(
+            [path, Rotation.from_rotvec(speed[:, None] * [1.0, 0, 0]).as_quat()], 1
+        )
+
+    found = proposed(episodes(written))
+    assert [found.forms[f"action_{k}"].is_plain for k in range(3, 7)] == [True] * 4
+    assert not {f"action_{k}" for k in range(3, 7)} & set(found.pairing)
+
+
 def test_contradictions_are_said():
     swapped = proposed(episodes(lambda p: p[:, [1, 0, 2]]), names=("hand_x", "hand_y", "hand_z"))
     assert any("Names and numbers contradict: state_m.hand_y answers hand_x" in note

@@ -182,6 +182,42 @@ def test_hdf5_attributes_and_data_sets_of_one_value(layouts, tmp_path):
     assert "elsewhere" not in kept
 
 
+def spoken(number):
+    """What a simulator says of an episode in one text: long, and another one each time."""
+    scene = {"objects": [{"path": f"objects/{number}/{k}.xml"} for k in range(20)]}
+    return json.dumps({"seed": f"s{977 * number}", "scene": scene, "success": number % 2 == 0,
+                       "lang": f"go {('left', 'right')[number % 2]}"})  # fmt: skip
+
+
+@pytest.mark.parametrize("stored_as", ["attribute", "data set", "column"])
+def test_one_object_that_says_all_is_kept_part_by_part(layouts, tmp_path, stored_as):
+    if stored_as == "column":
+        path = tmp_path / "recordings"
+        path.mkdir()
+        for i in range(EPISODES):
+            state, action = layouts.samples(i)
+            table = {"observation.x_m": state[:, 0], "action.x_m": action[:, 0]}
+            pq.write_table(pa.table({**table, "ep_meta": [spoken(i)] * 30}), path / f"e{i}.parquet")
+    else:
+        path = tmp_path / "demo.hdf5"
+        with h5py.File(path, "w") as file:
+            for i in range(EPISODES):
+                state, action = layouts.samples(i)
+                demo = file.create_group(f"data/demo_{i}")
+                demo.create_dataset("actions", data=action)
+                demo.create_dataset("obs/joint_pos", data=state)
+                demo.attrs["model_file"] = f"<mujoco model='{i}'>" + "<body/>" * 100
+                if stored_as == "attribute":
+                    demo.attrs["ep_meta"] = spoken(i)
+                else:
+                    demo.create_dataset("ep_meta", data=spoken(i))
+    _, kept = values_of(path, tmp_path)
+    # Of the episode's outcome nothing is a reason, whoever says it.
+    assert set(kept) == {"ep_meta.lang", "ep_meta.seed"}
+    said = {runs.values[0] for runs in kept["ep_meta.lang"].values()}
+    assert said == {"go left", "go right"}
+
+
 def test_mcap_metadata(factory, tmp_path):
     folder = tmp_path / "recordings"
     folder.mkdir()
