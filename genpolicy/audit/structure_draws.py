@@ -13,7 +13,7 @@ import numpy as np
 from genpolicy.audit.data import Array, AuditInput, Episodes, Integers, canonical
 from genpolicy.audit.documents import Counts
 from genpolicy.audit.neighbourhoods import Support
-from genpolicy.audit.reach import FIFTHS, fifth_of
+from genpolicy.audit.reach import FIFTHS, departures, fifth_of, with_departures
 from genpolicy.audit.reach_rows import FindingDraw, StructureDraw
 from genpolicy.audit.semantics import measure
 from genpolicy.audit.settings import AuditSettings
@@ -59,11 +59,13 @@ def queries_of(
     rows += [row for reach in support for row in reach.missed]
     queries = np.asarray(rows, dtype=np.int64)
     episodes, place = np.unique(data.episode[queries], return_inverse=True)
+    analysed = np.arange(len(queries)) < len(situations)
+    fifth, departs = fifth_of(data, settings, queries), departures(data, settings, queries)
     return Queries(
         episodes=episodes,
         place=np.asarray(place.reshape(-1), dtype=np.int64),
-        fifth=fifth_of(data, settings, queries),
-        analysed=(np.arange(len(queries)) < len(situations)).astype(np.float64),
+        fifth=with_departures(fifth, departs, analysed),
+        analysed=analysed.astype(np.float64),
         phase=np.unique([item.phase for item in situations], return_inverse=True)[1].reshape(-1),
         resolved=np.array(
             [item.clustering.count > 1 and not item.two_mode for item in situations], dtype=bool
@@ -172,4 +174,6 @@ def _episodes(times: Integers, place: Integers, weight: Array) -> int:
 
 
 def _by_fifth(fifth: Integers, weight: Array) -> tuple[int, ...]:
-    return tuple(int(value) for value in np.bincount(fifth, weights=weight, minlength=FIFTHS))
+    return tuple(
+        int(value) for value in np.bincount(fifth, weights=weight, minlength=FIFTHS)[:FIFTHS]
+    )

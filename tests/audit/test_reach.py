@@ -3,9 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
-from planar import SETTINGS
+from planar import SETTINGS, planar
 
-from genpolicy.audit.reach import fifth_of, reaches
+from genpolicy.audit.data import canonical
+from genpolicy.audit.reach import FIFTHS, departures, fifth_of, reaches, with_departures
 from genpolicy.audit.reach_rows import LOCAL
 
 HALF = SETTINGS.chunk_steps // 2
@@ -37,3 +38,28 @@ def test_each_fifth_says_of_how_much_it_could_speak():
         (1, 2, 1), (2, 0, 0), (3, 0, 0), (4, 0, 0), (5, 1, 1),
     ]  # fmt: skip
     assert (rows[0].share, rows[1].share) == (0.5, 1.0)
+
+
+def test_departures_stand_for_the_first_fifth_where_hardly_any_could_be_looked_at():
+    fifths = np.repeat([0, 1], [80, 40])
+    departs = np.arange(120) < 30
+    seeing, blind = np.ones(120, bool), np.arange(120) >= 27
+    assert with_departures(fifths, departs, seeing) is fifths
+    found = with_departures(fifths, departs, blind)
+    assert np.array_equal(found, np.repeat([0, FIFTHS, 1], [30, 50, 40]))
+    assert reaches(LOCAL, found, blind)[0].share == 0.1
+    # Of a few departures nothing follows, and neither where the others say as little.
+    assert with_departures(fifths, np.arange(120) < 19, blind) is fifths
+    assert with_departures(fifths, departs, np.arange(120) % 10 == 9) is fifths
+    assert with_departures(fifths, departs, np.zeros(120, bool)) is fifths
+
+
+def test_a_departure_is_the_begin_of_the_motion():
+    data = canonical(planar()[0])
+    rows = np.arange(len(data.episode))
+    found = departures(data, SETTINGS, rows)
+    first = rows == data.first_row
+    assert found[first].all()
+    count = np.bincount(data.episode[found])
+    assert (count >= SETTINGS.chunk_steps // 4).all()
+    assert found.mean() < 0.5

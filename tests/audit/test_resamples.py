@@ -21,7 +21,7 @@ NULL = np.linspace(0.0, 0.5, 99)
 # One row to each of twelve episodes: nothing moves, and rows are counted.
 DATA = SimpleNamespace(
     episode=np.arange(12), position=np.zeros((12, 0)), first_row=np.arange(12),
-    last_row=np.arange(12),
+    last_row=np.arange(12), action=np.zeros((12, 1)), action_position=slice(0, 1), forms=None,
 )  # fmt: skip
 
 

@@ -14,7 +14,8 @@ from genpolicy.audit.situations import Situation
 from genpolicy.audit.structure_draws import finding_draws, queries_of, structure_draw
 
 DATA = SimpleNamespace(
-    episode=np.repeat(np.arange(4), 10), position=np.zeros((40, 0)),
+    episode=np.repeat(np.arange(4), 10), position=np.zeros((40, 0)), forms=None,
+    action=np.zeros((40, 1)), action_position=slice(0, 1),
     first_row=np.repeat(np.arange(4), 10) * 10, last_row=np.repeat(np.arange(4), 10) * 10 + 9,
 )  # fmt: skip
 
