@@ -117,4 +117,4 @@ def _signs(quaternion: Array, episode: Integers) -> Array:
     usual = np.linalg.eigh(begins.T @ begins)[1][:, -1]
     side = np.where(begins @ usual < 0.0, -1.0, 1.0)
     side *= -1.0 if np.count_nonzero(side < 0.0) > len(side) / 2 else 1.0
-    return inside * np.repeat(side, lengths)
+    return np.asarray(inside * np.repeat(side, lengths), dtype=np.float64)

@@ -69,8 +69,7 @@ def _times_of_day(columns: Columns) -> Columns:
     for name, runs in columns.items():
         texts = _texts(runs)
         counted = _since_1970(texts)
-        moments = counted or {text: _moment(text) for text in texts}
-        dates = {text: item for text, item in moments.items() if item is not None}
+        dates = counted or {text: item for text in texts if (item := _moment(text)) is not None}
         if len(dates) < len(texts) or len({item.date() for item in dates.values()}) < 2:
             continue
         # By the clock of Greenwich a day's work may reach over midnight.
@@ -155,4 +154,4 @@ def _telling(words: dict[str, frozenset[str]], runs: list[Runs | None]) -> list[
 
 def _parts_alike(has: NDArray[np.bool_]) -> bytes:
     """The same for a word and for what stands wherever it does not."""
-    return (has ^ has[0]).tobytes()
+    return np.asarray(has ^ has[0]).tobytes()
