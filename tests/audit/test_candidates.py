@@ -93,46 +93,10 @@ def test_what_has_no_time_of_day_is_asked_by_none(data, values):
     assert not any("time of day" in name for name in names(found(data, **{"variable.a": values})))
 
 
-@pytest.mark.parametrize("unit", [1, 1e3, 1e9], ids=["s", "ms", "ns"])
-def test_seconds_since_1970_have_a_time_of_day(data, unit):
-    # By the clock of Greenwich the afternoons end after midnight: they stay one afternoon.
-    hours = [15.0 + k / 20 if k % 2 else 22.5 + k / 20 for k in range(N)]
-    days = [(7 * k) % 11 for k in range(N)]
-    values = [
-        (1.7e9 // 86400 * 86400 + day * 86400 + hour * 3600) * unit
-        for day, hour in zip(days, hours, strict=True)
-    ]
-    by_name = {item.name: item for item in found(data, **{"variable.begun": values}).variables}
-    day = by_name["begun (time of day)"].values
-    late = np.arange(N) % 2 == 0
-    assert day[late].min() > day[~late].max()
-
-
-def test_free_text_is_asked_by_its_words(data):
-    verbs = [f"verb{k % 14}" for k in range(N)]
-    texts = [f"{verb} to the {('Left', 'right')[k % 2]}." for k, verb in enumerate(verbs)]
-    result = found(data, **{"variable.said": texts})
-    assert names(result) == ["said", 'said ("left")']
-    (word,) = (item for item in result.variables if item.name != "said")
-    assert word.values.tolist() == [k % 2 for k in range(N)]
-    assert word.also == ()
-
-
 def test_text_that_names_every_episode_is_asked_by_its_words(data):
     texts = [f"{k:03d}: go {('left', 'right')[k % 2]}" for k in range(N)]
     result = found(data, **{"variable.note": texts})
     assert (names(result), result.left_out) == (['note ("left")'], (("note", EVERY_EPISODE),))
-
-
-@pytest.mark.parametrize(
-    "texts",
-    [[f"go {k % 12} {('left', 'right')[k % 2]}" for k in range(N)],
-     [f"{k:04d} {'left' if k < 4 else 'right'}" for k in range(N)],
-     [f"{8 + k // 6:02d}:{k % 6}5" for k in range(N)], [str(k % 15) for k in range(N)]],
-    ids=["few texts", "in few episodes", "times", "numbers"],
-)  # fmt: skip
-def test_words_are_not_asked_of(data, texts):
-    assert not any("(" in name for name in names(found(data, **{"variable.a": texts})))
 
 
 def test_the_task_is_called_as_the_recordings_call_it(data):
