@@ -13,6 +13,7 @@ from pathlib import Path
 
 from gates.may_differ import require_possible
 from genpolicy.candidates.brought import BroughtSection, require_brought
+from genpolicy.candidates.hosts.loadable import require_loadable
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -38,7 +39,10 @@ def work(params: Params) -> None:
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     if brought:
-        require_mapped(brought, load_task(params.task.name))
+        task = load_task(params.task.name)
+        require_mapped(brought, task)
+        for policy in brought:
+            require_loadable(policy.entry, policy.path, task.observation)
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))

@@ -28,6 +28,8 @@ from genpolicy.evidence.documents.brought import BROUGHT, FAULTS, Brought
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import FIXTURES_ON, NfeRow, SampleRow
+from genpolicy.evidence.split import split_sha256
+from genpolicy.integrity.documents import read_json
 
 MANIFEST = "artifacts/ingest/manifest.json"
 TOTAL = "total"
@@ -139,8 +141,15 @@ def _unpinned_of_brought(
             text += f"; {other}, by exception"
         else:
             missing.append(other)
+    elif entry.card.split and entry.card.split != _split(evidence):
+        missing.append("split: not that of the audited dataset, which it says it was trained on")
     missing += unrecorded(entry.card)
     return Measured(float(len(missing)), caveat=", ".join(missing) or text)
+
+
+def _split(evidence: Evidence) -> str:
+    """Of the audited dataset, whose manifest is bound already."""
+    return split_sha256(read_json(evidence.root / MANIFEST))
 
 
 def _brought(evidence: Evidence, candidate: str) -> Brought:

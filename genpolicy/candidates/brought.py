@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import RootModel
 
+from genpolicy.candidates.hosts.forms import require_forms
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.wire.entry import Entry, ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import require_program
@@ -88,6 +89,8 @@ def require_brought(
 ) -> list[BroughtPolicy]:
     """The same, of the names, horizons, files and programs that the ladder can work with.
 
+    Nothing of theirs is run.
+
     Args:
         section: Path of each entry by name.
         horizons: Of the ladder.
@@ -95,8 +98,8 @@ def require_brought(
         root: Of the workspace.
 
     Raises:
-        ConfigError: As `read_brought`; a name of a trained method, other horizons, or nothing on
-            this machine that runs it.
+        ConfigError: As `read_brought`; a name of a trained method, other horizons, a
+            file of another form than its kind needs, or nothing on this machine that runs it.
         IntegrityError: A file that is missing, or another one than its entry says.
     """
     found, taken = read_brought(section, seed=0, root=root), set(trained)
@@ -108,18 +111,28 @@ def require_brought(
                 expected="another one: rows of the two could not be told apart",
                 action=f"Give it another name, here and in {policy.path}.",
             )
-        if policy.entry.horizons != horizons:
-            raise ConfigError(
-                where=f"{policy.path}: horizons",
-                found=_said(policy.entry.horizons),
-                expected=f"{_said(horizons)}, as in params.yaml",
-                action="Bring a policy of these horizons, or set the horizons of the ladder.",
-            )
+        require_horizons(policy.entry, policy.path, horizons)
         verify_files(policy.entry, policy.folder)
         policy.entry.require_host()
+        require_forms(policy.entry, policy.folder)
         if isinstance(policy.entry, ServerEntry):
             require_program(policy.entry, policy.folder)
     return found
+
+
+def require_horizons(entry: Entry, path: Path, horizons: HorizonConfig) -> None:
+    """Refuse an entry of other horizons than the ladder has.
+
+    Raises:
+        ConfigError: It has others.
+    """
+    if entry.horizons != horizons:
+        raise ConfigError(
+            where=f"{path}: horizons",
+            found=_said(entry.horizons),
+            expected=f"{_said(horizons)}, as in params.yaml",
+            action="Bring a policy of these horizons, or set the horizons of the ladder.",
+        )
 
 
 def _read(name: str, path: Path, seed: int) -> BroughtPolicy:

@@ -5,25 +5,33 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from genpolicy.candidates.brought import require_horizons
 from genpolicy.candidates.conformance.check import Conformance, Question, check, question
+from genpolicy.candidates.conformance.finding import Finding
 from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import (
     RecordedStarts,
     recorded_starts,
     require_contract,
 )
+from genpolicy.candidates.conformance.stated import DatasetHashes, stated
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
-from genpolicy.candidates.wire.entry import ServerEntry, verify_files
+from genpolicy.candidates.mapped import require_map
+from genpolicy.candidates.wire.entry import Entry, ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.cli.task_checks import task_checks
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.observation import ObservationContract
+from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import BadInputError
-from genpolicy.integrity.documents import read_json
+from genpolicy.evidence.split import split_sha256
+from genpolicy.integrity.documents import read_json, read_yaml
 
 REFUSED = 3
+PARAMS = Path("params.yaml")
 MOMENTS_SEED = 0
 """Of the moments of a check; the ladder's are drawn from its own root seed."""
 NO_VERDICT = (
@@ -66,15 +74,35 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = data.observation_contract
+    _require_horizons_of_the_ladder(entry, path)
     starts = recorded_starts(data, entry.horizons, seed=MOMENTS_SEED)
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)
-    asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible, checks.scene)
+    hashes = DatasetHashes(data.manifest_sha256, split_sha256(data.manifest))
+    asked = _Asked(
+        starts, what, options.deadline_s, earlier, checks.admissible, checks.scene,
+        tuple(stated(entry, hashes)),
+    )  # fmt: skip
     verify_files(entry, folder)
+    require_map(entry, contract, checks.scene)
     found = _found(as_server(entry, path, contract), folder, contract, asked)
-    print(json.dumps(found.as_json(), indent=2, sort_keys=True) if as_json else _text(found))
+    if as_json:
+        print(json.dumps(found.as_json(), indent=2, sort_keys=True))
+    else:
+        print(_text(found, hashes))
     return REFUSED if found.failed else 0
+
+
+def _require_horizons_of_the_ladder(entry: Entry, path: Path) -> None:
+    """Where settings of a ladder are at hand; elsewhere nobody can tell."""
+    if not PARAMS.is_file():
+        return
+    params = read_yaml(PARAMS)
+    said = params.get("horizons") if isinstance(params, dict) else None
+    if isinstance(said, dict):
+        horizons = parse_settings(HorizonConfig, said, where=f"{PARAMS}: horizons")
+        require_horizons(entry, path, horizons)
 
 
 def _found(
@@ -98,7 +126,7 @@ def _found(
         return check(
             policy_of(running), asked.starts, asked=asked.what, deadline_s=asked.deadline_s,
             restarted=restarted if entry.command is not None else None, earlier=asked.earlier,
-            admissible=asked.admissible,
+            admissible=asked.admissible, said=asked.said,
         )  # fmt: skip
 
 
@@ -110,6 +138,7 @@ class _Asked:
     earlier: str | None
     admissible: Admissible | None
     scene: Path | None
+    said: tuple[Finding, ...]
 
 
 def _earlier(path: Path | None, now: Question) -> str | None:
@@ -138,13 +167,15 @@ def _earlier(path: Path | None, now: Question) -> str | None:
     return digest
 
 
-def _text(found: Conformance) -> str:
+def _text(found: Conformance, data: DatasetHashes) -> str:
     width = max(len(finding.name) for finding in found.findings)
     lines = [
         f"{found.candidate}: {found.asked.candidates} chunks at each of {found.asked.moments} "
         f"recorded moments of {found.asked.episodes} episodes.",
         f"Serves {found.checkpoint or 'an unknown checkpoint'}; its answers are "
         f"{found.answers_sha256 or 'not the same twice'}.",
+        f"Of who was trained on this dataset, `declared` says dataset: {data.manifest}",
+        f"and split: {data.split}",
         "",
         *(
             f"{finding.judged:8}{finding.gate}  {finding.name:{width}}  {finding.said}"

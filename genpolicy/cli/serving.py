@@ -26,9 +26,12 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None, device: str) -
 
 
 def run_host(
-    path: Path, *, port: int, sha256: str | None, widths: list[str], threads: int | None
-) -> int:
+    path: Path, *, port: int, sha256: str | None, widths: list[str], threads: int | None,
+    only_loaded: bool = False,
+) -> int:  # fmt: skip
     """Serve what an entry names on this machine until an interrupt. Returns the exit code.
+
+    With `only_loaded` it ends where it would begin to listen.
 
     Raises:
         ConfigError: Nobody may listen on that port, or a width that is none.
@@ -36,6 +39,8 @@ def run_host(
     """
     known = dict(_width(said) for said in widths)
     served = hosted(path, sha256=sha256, widths=known, threads=threads)
+    if only_loaded:
+        return 0
     return _listen(served, str(path), port)
 
 

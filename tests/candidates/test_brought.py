@@ -62,6 +62,42 @@ def test_what_the_ladder_cannot_work_with_is_refused_by_name(brought, tmp_path, 
         require_brought(brought(**changes), horizons=HORIZONS, root=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"address": "http://127.0.0.1:8000"}, r"address is 'http://.*expected ws://HOST:PORT"),
+        ({"address": "nonsense"}, r"planted\.yaml\.address is 'nonsense', expected ws://HOST:PORT"),
+        ({"address": "ws://192.168.0.7:8000"}, "192.168.0.7, another machine.*`allow_host`"),
+        ({"address": "ws://192.168.0.7:8000", "allow_host": "192.168.0.8"}, "another machine"),
+    ],
+)
+def test_where_nobody_may_be_asked_is_refused_before_anything_runs(
+    brought, tmp_path, changes, told
+):
+    with pytest.raises(ConfigError, match=told):
+        require_brought(brought(**changes), horizons=HORIZONS, root=tmp_path)
+    with pytest.raises(ConfigError, match=told):
+        read_brought(brought(**changes), seed=0, root=tmp_path)
+
+
+def test_another_machine_that_is_allowed_is_no_mistake(brought, tmp_path):
+    section = brought(address="ws://192.168.0.7:8000", allow_host="192.168.0.7")
+    assert len(require_brought(section, horizons=HORIZONS, root=tmp_path)) == 1
+
+
+def test_files_of_another_form_are_refused_before_anything_runs(tmp_path):
+    """What is read is not run: see tests of `hosts.forms` for each form."""
+    (tmp_path / "planner.py").write_text("open('it_ran', 'w')\n")
+    entry = {name: value for name, value in ENTRY.items() if name != "address"} | {
+        "kind": "scripted", "function": "planner:plan", "stochastic": False,
+        "files": {"planner.py": sha256_file(tmp_path / "planner.py")},
+    }  # fmt: skip
+    (tmp_path / "planted.yaml").write_text(yaml.safe_dump(entry))
+    with pytest.raises(ConfigError, match=r"planner\.py is a module without the function plan"):
+        require_brought({"planted": "planted.yaml"}, horizons=HORIZONS, root=tmp_path)
+    assert not (tmp_path / "it_ran").exists()
+
+
 def test_a_program_that_is_not_there_is_refused_before_anything_runs(brought, tmp_path):
     def require(*command):
         section = brought(address=None, command=[*command, "{port}"])

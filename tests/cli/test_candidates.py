@@ -15,8 +15,10 @@ import torch
 import yaml
 
 from genpolicy.candidates.wire.connection import Listening, dial
+from genpolicy.cli import candidates as checking
 from genpolicy.cli.candidates import ASKED_LATER
 from genpolicy.cli.main import main
+from genpolicy.evidence.split import split_sha256
 from genpolicy.integrity.hashing import sha256_file
 
 DOCS = Path(__file__).parents[2] / "docs" / "candidates.md"
@@ -24,27 +26,32 @@ PYTHON = [sys.executable, "-m", "genpolicy"]
 
 
 @pytest.fixture
-def folder(fleet, tmp_path):
+def folder(fleet, dataset, tmp_path):
     """The entry of the docs beside its checkpoint."""
-    return with_entry(fleet, tmp_path)
+    return with_entry(fleet, tmp_path, dataset)
 
 
 @pytest.fixture(scope="module")
 def checked(fleet, dataset, tmp_path_factory):
     """The same, and the report of a check of it, as `--json` prints it."""
-    place = with_entry(fleet, tmp_path_factory.mktemp("checked"))
+    place = with_entry(fleet, tmp_path_factory.mktemp("checked"), dataset)
     with (place / "checked.json").open("w") as out, contextlib.redirect_stdout(out):
         assert run(place, dataset, "--deadline", "5", "--json") == 0
     return place
 
 
-def with_entry(fleet, place):
+def with_entry(fleet, place, dataset):
     shutil.copytree(fleet[0] / "flow", place / "flow")
     [text] = re.findall(r"```yaml\n# candidate\.yaml\n(.*?)```", DOCS.read_text(), re.DOTALL)
     digest = sha256_file(place / "flow" / "seed_0" / "model.safetensors")
     entry = yaml.safe_load(text.replace("@weights@", digest))
     assert entry["command"][0] == "genpolicy"
     entry["command"][:1] = PYTHON
+    [text] = re.findall(r"```yaml\n(declared:.*?)```", DOCS.read_text(), re.DOTALL)
+    manifest = dataset / "manifest.json"
+    split = split_sha256(json.loads(manifest.read_bytes()))
+    text = text.replace("@manifest@", sha256_file(manifest)).replace("@split@", split)
+    entry |= yaml.safe_load(text)
     (place / "candidate.yaml").write_text(yaml.safe_dump(entry))
     return place
 
@@ -105,7 +112,7 @@ def test_a_server_in_joint_space_is_checked_like_any_other(folder, dataset, caps
     assert run(folder, dataset, "--deadline", "5", "--json") == 0
     found = {one["name"]: one["judged"] for one in json.loads(capsys.readouterr().out)["findings"]}
     assert {name for name, what in found.items() if what == "holds"} == {
-        "answers", "repeats", "restarts", "seeded", "evaluations", "spans",
+        "pinned", "declared", "answers", "repeats", "restarts", "seeded", "evaluations", "spans",
     }  # fmt: skip
     action = yaml.safe_load(said)["action"]
     action["joints"]["columns"] = action["joints"]["columns"][:6]
@@ -125,7 +132,9 @@ def test_the_docs_commands_as_written(checked, dataset, capsys):
         "follows_observation", "scale", "origin", "orientation", "own_answers", "unchanged",
         "in_time", "admissible",
     }  # fmt: skip
-    holds = {"answers", "repeats", "restarts", "seeded", "evaluations", "spans"}
+    holds = {
+        "pinned", "declared", "answers", "repeats", "restarts", "seeded", "evaluations", "spans",
+    }  # fmt: skip
     assert {finding["name"]: finding["judged"] for finding in report_of(checked)["findings"]} == {
         **dict.fromkeys(holds, "holds"), **dict.fromkeys(unknown, "unknown"),
     }  # fmt: skip
@@ -133,6 +142,8 @@ def test_the_docs_commands_as_written(checked, dataset, capsys):
     assert run(checked, dataset, *earlier) == 0
     said = capsys.readouterr().out
     assert "holds   B  unchanged" in said
+    entry = yaml.safe_load((checked / "candidate.yaml").read_text())["declared"]
+    assert f"dataset: {entry['dataset']}\nand split: {entry['split']}\n" in said
     assert "Nothing here is a gate's verdict" in said
     # A line a gate: what it will find, what nobody can tell yet, what it asks besides.
     of_b, of_c, of_d = re.findall(r"^Gate [BCD]: .*$", said, re.MULTILINE)
@@ -155,7 +166,8 @@ def test_another_checkpoint_behind_the_same_entry_is_told(folder, checked, fleet
     code = run(folder, dataset, "--deadline", "5", "--earlier", str(checked / "checked.json"))
     assert code == 3
     said = capsys.readouterr().out
-    assert "Refused: unchanged (gate B)." in said and "Gate B: here it fails unchanged;" in said
+    assert "Refused: pinned (gate B), unchanged (gate B)." in said
+    assert "Gate B: here it fails pinned, unchanged;" in said
 
 
 @pytest.mark.parametrize(
@@ -202,6 +214,30 @@ def test_a_mistake_is_one_sentence(folder, dataset, capsys, fields, said):
         del entry["command"]
         path.write_text(yaml.safe_dump(entry))
     assert said in refused(capsys, run(folder, dataset))
+
+
+def test_what_cannot_be_mapped_or_judged_is_refused_without_a_start(
+    folder, dataset, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(checking, "Launched", lambda *_, **__: pytest.fail("it was started"))
+    before = yaml.safe_load((folder / "candidate.yaml").read_text())
+    anchor = {"position": ["tcp_position"], "rotation": ["tcp_rotation"]}
+    change(folder, action={**before["action"], "motion": "relative", "anchor": anchor})
+    assert "'tcp_position', expected a channel" in refused(capsys, run(folder, dataset))
+    change(folder, **before)
+    horizons = {**before["horizons"], "execution_horizon": 4}
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump({"horizons": horizons}))
+    monkeypatch.chdir(tmp_path)
+    assert "execution_horizon 4" in refused(capsys, run(folder, dataset))
+
+
+def test_what_gate_b_will_not_take_is_said(folder, dataset, capsys):
+    path = folder / "candidate.yaml"
+    entry = yaml.safe_load(path.read_text())
+    del entry["declared"]
+    path.write_text(yaml.safe_dump({**entry, "files": {}}))
+    assert run(folder, dataset, "--deadline", "5") == 3
+    assert "Refused: pinned (gate B), declared (gate B)." in capsys.readouterr().out
 
 
 def test_no_dataset_and_no_report(folder, dataset, tmp_path, capsys):

@@ -12,6 +12,7 @@ import yaml
 
 from genpolicy.candidates.hosts import onnx_library
 from genpolicy.cli.main import main
+from genpolicy.evidence.split import split_sha256
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.policies.policy import load_policy
 
@@ -80,6 +81,12 @@ def entry_of(place, kind):
 @pytest.mark.parametrize("kind", ["trained", "torch", "onnx", "scripted"])
 def test_the_entries_of_the_docs_are_checked(place, dataset, capsys, kind):
     path = entry_of(place, kind)
+    [text] = re.findall(r"```yaml\n(declared:.*?)```", DOCS, re.DOTALL)
+    manifest = dataset / "manifest.json"
+    split = split_sha256(json.loads(manifest.read_bytes()))
+    text = text.replace("@manifest@", sha256_file(manifest)).replace("@split@", split)
+    declared = yaml.safe_load(text)["declared"]
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), "declared": declared}))
     words = ["check-candidate", str(path), "--dataset", str(dataset), "--deadline", "20", "--json"]
     assert main(words) == 0
     found = json.loads(capsys.readouterr().out)

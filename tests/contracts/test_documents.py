@@ -16,7 +16,7 @@ from metadata import ROOT, write_metadata
 from genpolicy.cli.main import main
 
 DOCS = ROOT / "docs"
-NEWCOMERS = ("index.md", "example.md", "refusals.md", "troubleshooting.md")
+NEWCOMERS = ("index.md", "example.md", "refusals.md", "troubleshooting.md", "candidates.md")
 LEFT_OUT = "..."
 
 

@@ -4,7 +4,7 @@ A minute on recorded moments; nothing moves. Each finding holds, fails, or is no
 was seen, and which gate asks for it. None of it is a verdict of a gate.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -133,6 +133,7 @@ def check(
     restarted: Callable[[], RemotePolicy] | None,
     earlier: str | None = None,
     admissible: Admissible | None = None,
+    said: Sequence[Finding] = (),
 ) -> Conformance:
     """Ask a policy about recorded moments, again in another order, and after a new start.
 
@@ -144,6 +145,7 @@ def check(
         restarted: Ends its process and starts another; None where we did not start it.
         earlier: `answers_sha256` of an earlier check; None for none.
         admissible: Whether a chunk passes every layer of the task; None where there is none.
+        said: What was found of its entry.
     """
     candidates = asked.candidates
     wire = round_trips(policy)
@@ -156,7 +158,7 @@ def check(
         try:
             after = asked_again(restarted(), starts, first, candidates)
         except PolicyError as error:
-            restart_fault = str(error)
+            restart_fault = error.seen
     answered = Answered(first, again, after, restart_fault)
     of_answers = findings_of(starts, answered, told)
     repeats = next(one for one in of_answers if one.name == "repeats")
@@ -164,6 +166,7 @@ def check(
     digest = _digest(again) if repeats.judged == "holds" and complete else None
     of_each = first.before(starts.apart)
     findings = [
+        *said,
         *of_answers,
         found.unchanged(digest, earlier, complete=complete),
         found.admissible(of_each, starts, admissible),

@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from genpolicy.candidates.hosts.onnx_library import require_onnx
+from genpolicy.candidates.wire.address import check_address
 from genpolicy.candidates.wire.declared import DIGEST, Choice
 from genpolicy.candidates.wire.entry import CPU, Entry, ServerEntry
+from genpolicy.candidates.wire.parsing import parse_entry
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
@@ -254,7 +256,8 @@ def read_entry(path: Path) -> Entry:
     """The entry of a file.
 
     Raises:
-        ConfigError: No readable YAML, an unknown kind, or a field that is missing or wrong.
+        ConfigError: No readable YAML, an unknown kind, a field that is missing or wrong, or an
+            address that is none or of a machine that nobody allowed.
     """
     values = read_yaml(path)
     if not isinstance(values, dict):
@@ -272,7 +275,9 @@ def read_entry(path: Path) -> Entry:
             expected=f"one of {', '.join(KINDS)}",
             action="See docs/candidates.md.",
         )
-    entry = parse_settings(KINDS[kind], values, where=str(path))
+    entry = parse_entry(KINDS[kind], values, where=str(path))
+    if isinstance(entry, ServerEntry) and entry.address is not None:
+        check_address(entry.address, entry.allow_host, where=f"{path}.address")
     if isinstance(entry, TrainedEntry) and entry.samplers:
         _require_settings(entry, path)
     return entry

@@ -20,10 +20,9 @@ from genpolicy.candidates.hosts.ports import Program, check_ports
 from genpolicy.candidates.hosts.scripted import scripted_function
 from genpolicy.candidates.judged import loaded_on, sampling_by
 from genpolicy.candidates.wire.declared import Choice
-from genpolicy.candidates.wire.entry import Entry, verify_files
+from genpolicy.candidates.wire.entry import Entry, read_file, verify_files
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.errors import ConfigError, IntegrityError
-from genpolicy.integrity.hashing import read_verified
 from genpolicy.policies.policy import NetworkPolicy
 
 HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
@@ -142,6 +141,4 @@ def _bytes(entry: Entry, folder: Path, name: str) -> bytes:
             expected="the SHA-256 of every file that it reads",
             action=f"Write `{name}: <sha256>` into `files`.",
         )
-    return read_verified(
-        folder / name, sha256=entry.files[name], named_by=f"the entry of {entry.name}"
-    )
+    return read_file(entry, folder, name, entry.files[name])

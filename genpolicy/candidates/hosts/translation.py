@@ -82,6 +82,17 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
     }
 
 
+def loading_command(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
+    """The command of a child that loads a candidate as its host does, and ends.
+
+    Raises:
+        ContractError: It names what the observation does not have.
+    """
+    return [word for word in _own(entry, path, contract) if word not in ("--port", PORT)] + [
+        "--check"
+    ]
+
+
 def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
     """Our host. `-P`: what lies beside the entry is not found by an `import`."""
     widths = {

@@ -5,9 +5,7 @@ speaks first, a map of metadata; then one message up, one down; a text instead o
 went wrong. Nothing but a policy is reached through it: see the test of safety.
 """
 
-import ipaddress
 import logging
-import re
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
@@ -18,13 +16,12 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake, PayloadToo
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import Server, ServerConnection, serve
 
+from genpolicy.candidates.wire.address import check_address
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
-from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.errors import IntegrityError
 
 LOOPBACK = "127.0.0.1"
-ADDRESS = re.compile(r"ws://(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):(?P<port>\d{1,5})/?")
-LAST_PORT = 65535
 HEALTH_PATH = "/healthz"
 PING_S = None
 """No pings: openpi's server answers none while it infers, which is no fault of it."""
@@ -38,41 +35,6 @@ Clock = Callable[[], float]
 """Seconds of a clock that only goes forward."""
 SHUT_BOTH = 2
 """`socket.SHUT_RDWR`: neither side reads or writes any more."""
-
-
-def check_address(address: str, allowed: str | None) -> None:
-    """Refuse an address that is neither on this machine nor allowed by name.
-
-    Args:
-        address: `ws://host:port`.
-        allowed: A host that a person has named besides; None for none.
-
-    Raises:
-        ConfigError: No such address, or another machine's.
-    """
-    parts = ADDRESS.fullmatch(address)
-    if parts is None or int(parts["port"]) > LAST_PORT:
-        raise ConfigError(
-            where="address of a policy's process",
-            found=repr(address),
-            expected="ws://HOST:PORT",
-            action="Name host and port.",
-        )
-    host = parts["host"].strip("[]")
-    if not (_is_loopback(host) or host == allowed):
-        raise ConfigError(
-            where="address of a policy's process",
-            found=f"{host}, another machine",
-            expected="this machine, or a host that `allow_host` names",
-            action="Name the host in `allow_host` if observations may be sent to it.",
-        )
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 class Connection:

@@ -30,7 +30,8 @@ class Declared(Settings):
 
     Attributes:
         dataset: SHA-256 of the manifest of the dataset that it was trained on.
-        split: SHA-256 of the list of episodes that trained it.
+        split: SHA-256 of the split of that dataset, whose training part trained it: what
+            `check-candidate` prints.
         training_seed: Root seed of its training.
         architecture: Encoder, trunk and head with their sizes.
         parameters: Of the network that runs.

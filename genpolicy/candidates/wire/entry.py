@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from genpolicy.candidates.wire.declared import DIGEST, Choice, Declared
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
-from genpolicy.errors import ConfigError
+from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import read_verified, sha256_bytes
 
@@ -75,7 +75,8 @@ class Orientation(Settings):
     def _as_wide_as_its_form(self) -> "Orientation":
         if len(self.columns) != ROTATION_WIDTH[self.form]:
             raise ValueError(
-                f"{self.form} has {ROTATION_WIDTH[self.form]} numbers, not {len(self.columns)}"
+                f"the form {self.form} has {ROTATION_WIDTH[self.form]} columns, not "
+                f"{len(self.columns)}"
             )
         return self
 
@@ -178,11 +179,13 @@ class Output(Settings):
     @model_validator(mode="after")
     def _consistent(self) -> "Output":
         if self.motion == "absolute" and self.frame == "tcp":
-            raise ValueError("an absolute place is in the frame robot_base")
+            raise ValueError("the motion absolute is in the frame robot_base")
         if self.motion == "absolute" and self.rotation is None and self.joints is None:
-            raise ValueError("an absolute motion says its rotation")
+            raise ValueError("the motion absolute says its rotation")
         if self.anchor is None and self.motion != "absolute":
-            raise ValueError("anchor names the pose that it is relative to")
+            raise ValueError(
+                f"the motion {self.motion} has an anchor, the pose that it starts from"
+            )
         if len(set(self.columns)) != len(self.columns):
             raise ValueError("each column means one thing")
         return self
@@ -323,4 +326,24 @@ def verify_files(entry: Entry, folder: Path) -> None:
                 action=f"Write `{name}: <sha256>` into `files`.",
             )
     for name, digest in sorted(entry.files.items()):
-        read_verified(folder / name, sha256=digest, named_by=f"the entry of {entry.name}")
+        read_file(entry, folder, name, digest)
+
+
+def read_file(entry: Entry, folder: Path, name: str, sha256: str) -> bytes:
+    """A file of a candidate, verified; no stage writes it, so that its author is told what to do.
+
+    Raises:
+        IntegrityError: It is missing, a link, or another one.
+    """
+    path = folder / name
+    try:
+        return read_verified(path, sha256=sha256, named_by=f"the entry of {entry.name}")
+    except IntegrityError as error:
+        action = f"Restore it, or write the hash of what it is now into `files` ({name})."
+        if path.is_symlink():
+            action = "Copy it with `cp -rL`, which follows links, and name the copy in the entry."
+        elif not path.exists():
+            action = f"Put it there, or take `{name}` out of `files`."
+        raise IntegrityError(
+            where=error.where, found=error.found, expected=error.expected, action=action
+        ) from error

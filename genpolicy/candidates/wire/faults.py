@@ -30,12 +30,39 @@ class Fault(StrEnum):
     """It failed so often in a row that it is asked no more."""
 
 
+WHOLE = "one answer to one message, of the declared shape"
+LOOK = "Look at what the server prints; `genpolicy check-candidate` asks it alone."
+EXPECTED = {
+    Fault.LATE: "an answer in time",
+    Fault.CLOSED: "a server that listens and stays",
+    Fault.REFUSED: WHOLE,
+    Fault.OVERSIZE: "messages of at most 16 MiB",
+    Fault.MALFORMED: "a map in msgpack, as openpi writes it",
+    Fault.SHAPE: WHOLE,
+    Fault.UNREQUESTED: WHOLE,
+    Fault.CHANGED: "one checkpoint and one sampler from its start to its end",
+    Fault.NONFINITE: "finite numbers",
+    Fault.GONE: "an answer now and then",
+}
+ACTION = {
+    Fault.LATE: "Allow it more (`timeout_s`, `start_timeout_s`), or make it faster.",
+    Fault.CLOSED: "Start the server that `address` names, or run `command` by hand and read what "
+    "it prints.",
+    Fault.SHAPE: "Correct `action` and `horizons` of the entry, or the server.",
+    Fault.CHANGED: "Start it anew, and serve one checkpoint.",
+}
+
+
 class PolicyError(GenpolicyError):
     """A policy's process failed an invocation; there is no chunk, and nothing of ours is broken.
 
     Args:
         fault: Which kind.
         found: What was seen, for a person.
+
+    Attributes:
+        expected: What such a process owes.
+        action: What its author should do next, a full sentence.
     """
 
     exit_code = 2
@@ -43,7 +70,14 @@ class PolicyError(GenpolicyError):
     def __init__(self, fault: Fault, found: str) -> None:
         self.fault = fault
         self.found = found
-        super().__init__(f"the policy's process is at fault ({fault}): {found}")
+        self.expected = EXPECTED[fault]
+        self.action = ACTION.get(fault, LOOK)
+        super().__init__(f"{self.seen}, expected {self.expected}. {self.action}")
+
+    @property
+    def seen(self) -> str:
+        """Kind and what was seen, as evidence says it."""
+        return f"the policy's process is at fault ({self.fault}): {self.found}"
 
     def __reduce__(self) -> tuple[type["PolicyError"], tuple[Fault, str]]:
         """Keep both fields when the error crosses a process boundary."""

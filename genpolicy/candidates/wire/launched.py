@@ -102,8 +102,10 @@ class Launched(AbstractContextManager["Launched"]):
             return None
         assert self._printed is not None  # a process prints
         self._printed.drained(LOOK_S)
-        said = self._printed.last_words(LAST_WORDS)
-        return f"it ended with {code}; its last words: {said.splitlines()[-1:]}"
+        lines = self._printed.last_words(LAST_WORDS).splitlines()
+        return f"it ended with {code}; " + (
+            f"its last words: {lines[-1]}" if lines else "it had said nothing"
+        )
 
     def end(self) -> None:
         """End what was started here, with all that it started; no other server is touched."""

@@ -229,7 +229,7 @@ class WirePolicy:
 
     def _counted(self, error: PolicyError) -> Fault:
         self.faults[error.fault] += 1
-        self.last_words = str(error)
+        self.last_words = error.seen
         return error.fault
 
     def _chunks(self, answer: Invocation | Fault, candidates: int) -> Array:

@@ -1,6 +1,6 @@
 """The identity card of a candidate: what a reviewer must know to speak of the same thing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
 from genpolicy.evidence.reproducibility.benchmark import DISCARDED
+from genpolicy.evidence.split import split_sha256
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.policies.checkpoint import CONFIG_FILE, CheckpointConfig
@@ -83,7 +84,7 @@ def card_of(
         parameters=config.parameters["total"],
         training_seeds=[str(each.checkpoint.config.training_seed) for each in policies],
         dataset=config.provenance.dataset_manifest_sha256,
-        split=config.provenance.episodes_sha256 or _split(data.manifest),
+        split=config.provenance.episodes_sha256 or split_sha256(data.manifest),
         action_semantics=config.provenance.action_contract_sha256,
         observation_semantics=config.provenance.observation_contract_sha256,
         observation_horizon=horizons.observation_horizon,
@@ -144,11 +145,6 @@ def _path(config: CheckpointConfig, sampler: SamplerConfig) -> str:
     if sampler.name == "consistency":
         return f"straight path, consistent in {config.head.flow_segments} segments"
     return "none: no transport from noise"
-
-
-def _split(manifest: Mapping[str, object]) -> str:
-    """The successful episodes of the training split follow from the split as it stands there."""
-    return sha256_bytes(canonical_json(manifest["split"]))
 
 
 def _precision(policy: NetworkPolicy) -> str:

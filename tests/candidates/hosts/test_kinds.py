@@ -1,9 +1,12 @@
+import re
 import shutil
+from pathlib import Path
 
 import pytest
 import torch
+import yaml
 
-from genpolicy.candidates.brought import require_brought
+from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.hosts import onnx_library
 from genpolicy.candidates.hosts.kinds import KINDS, chosen, read_entry
 from genpolicy.candidates.hosts.translation import as_server
@@ -159,3 +162,39 @@ def test_noise_of_several_steps_has_an_axis_more(written):
     noise = read_entry(written("torch", noise={**NOISE, "steps": 5})).noise
     assert noise.whole_shape == (5, 16, 10)
     assert read_entry(written("torch")).noise.whole_shape == (16, 10)
+
+
+DOCS = (Path(__file__).parents[3] / "docs" / "candidates.md").read_text()
+BLOCKS = re.findall(r"```yaml\n(.*?)```", DOCS, re.DOTALL)
+OF_THE_LADDER = "params.yaml"
+
+
+def named(block):
+    """What a block of the docs begins with: the name of its file, or its first key."""
+    return re.match(r"(?:# )?([\w.]+)", block)[1]
+
+
+def said(block):
+    return yaml.safe_load(re.sub(r"@\w+@", "0" * 64, block))
+
+
+def test_every_block_of_the_docs_is_looked_at():
+    assert {named(block) for block in BLOCKS} == {
+        "candidate.yaml", "joints", "trained.yaml", "torch.yaml", "scripted.yaml", OF_THE_LADDER,
+        "declared", "samplers", "lerobot.yaml",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=named)
+def test_every_entry_and_every_part_of_one_in_the_docs_is_read(block, tmp_path):
+    fields = said(block)
+    if named(block) == OF_THE_LADDER:
+        assert BroughtSection.model_validate(fields["candidates"]).root.keys() == {"my_flow"}
+        return
+    [whole] = [said(one) for one in BLOCKS if named(one) == "candidate.yaml"]
+    if "kind" in fields:
+        del whole["command"]
+    path = tmp_path / "candidate.yaml"
+    path.write_text(yaml.safe_dump({**whole, **fields}))
+    read = read_entry(path).model_dump(mode="json", exclude_unset=True)
+    assert read.keys() >= fields.keys()

@@ -7,7 +7,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import serve
 
 from genpolicy.candidates.wire import connection
-from genpolicy.candidates.wire.connection import Listening, check_address, dial, free_port
+from genpolicy.candidates.wire.connection import Listening, dial, free_port
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack
 from genpolicy.errors import ConfigError
@@ -272,20 +272,6 @@ def test_who_answers_no_ping_is_not_at_fault(raw):
     line.close()
 
 
-@pytest.mark.parametrize("address", ["ws://127.0.0.1:80", "ws://localhost:80", "ws://[::1]:8000"])
-def test_this_machine_needs_no_permission(address):
-    check_address(address, None)
-
-
-def test_another_machine_needs_its_name():
-    with pytest.raises(ConfigError, match="another machine") as error:
-        check_address("ws://10.0.0.7:8000", None)
-    assert "allow_host" in error.value.action
-    check_address("ws://10.0.0.7:8000", "10.0.0.7")
-    with pytest.raises(ConfigError, match="another machine"):
-        check_address("ws://10.0.0.8:8000", "10.0.0.7")
-
-
 def test_no_line_is_opened_to_another_machine(monkeypatch):
     monkeypatch.setattr(connection, "connect", lambda *_, **__: pytest.fail("it dialled"))
     with pytest.raises(ConfigError, match="another machine"):
@@ -297,15 +283,6 @@ def test_no_proxy_is_asked(monkeypatch, serving):
     monkeypatch.setenv("all_proxy", "http://192.0.2.1:3128")
     with serving(lambda _: {}, HELLO) as address:
         assert asked(address) == {}
-
-
-@pytest.mark.parametrize(
-    "address", ["http://localhost:80", "wss://localhost:80", "ws://localhost", "ws://:80",
-                "ws://localhost:80/path", "ws://localhost:99999999", "localhost:80", ""],
-)  # fmt: skip
-def test_what_is_no_address_is_refused(address):
-    with pytest.raises(ConfigError, match="expected ws://HOST:PORT"):
-        check_address(address, None)
 
 
 def test_a_server_listens_on_this_machine_only():

@@ -48,7 +48,7 @@ def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
         ({"constants": {"genpolicy": 1}}, "", "the word of what is asked"),
         ({"constants": {"seed": 10**20}}, "", "integers of 64 bits"),
         ({"files": {"a": "12"}}, "files.a", "pattern"),
-        ({"weights": "x"}, "weights", "Extra inputs"),
+        ({"weights": "x"}, "weights", "fields of a candidate of kind server"),
         ({"action": action(frame="tcp")}, "action", "frame robot_base"),
         ({"action": action(motion="relative")}, "action", "anchor"),
         ({"action": joints(frame="robot_base")}, "action", "stand alone"),
@@ -74,7 +74,7 @@ def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
         ({"action": action(position={"columns": [0, 1, 2], "unit": "inch"})}, "unit", "'mm'"),
         (
             {"action": action(rotation={"columns": [3, 4, 5], "form": "quaternion_xyzw"})},
-            "action.rotation", "4 numbers, not 3",
+            "action.rotation", "4 columns, not 3",
         ),
         (
             {"action": action(gripper={"column": 9, "open": 0.0, "open_m": 0.04})},

@@ -9,4 +9,6 @@ from genpolicy.candidates.wire.faults import Fault, PolicyError
 def test_a_fault_keeps_kind_and_words_across_processes(fault):
     error = pickle.loads(pickle.dumps(PolicyError(fault, "no answer")))
     assert (error.fault, error.found, error.exit_code) == (fault, "no answer", 2)
-    assert str(error) == f"the policy's process is at fault ({fault}): no answer"
+    assert error.seen == f"the policy's process is at fault ({fault}): no answer"
+    assert str(error) == f"{error.seen}, expected {error.expected}. {error.action}"
+    assert error.expected and error.action.endswith(".")

@@ -7,6 +7,8 @@ import evidence
 import pytest
 from asked import found_in
 
+from gates.card.card import caveats_of
+from gates.doubts import of_a_ladder
 from gates.proof import judge
 from gates.reproducibility.settings import MATCHING
 from gates.settings import WAIVED
@@ -78,6 +80,17 @@ def test_by_exception_it_passes_and_the_report_says_who_answers(ladder):
     assert WAIVED.match(said)  # so it stands at the top of the page
 
 
+def test_unmatched_evidence_stands_first_on_the_desk_and_on_the_card(ladder):
+    promoting = judge(ladder, "D")
+    bring(ladder, unmatched=EXCEPTION)
+    report = judge(ladder, "B")
+    (said,) = [text for text in report.caveats if "unmatched evidence" in text]
+    weighed, behind = of_a_ladder([report])
+    assert [doubt.text for doubt in weighed if doubt.kind == "not asked"] == [said]
+    assert said not in [doubt.text for doubt in behind]
+    assert said in caveats_of({"B": report, "D": promoting})
+
+
 def test_a_process_that_failed_fails_by_its_last_words(ladder):
     failed = {"asked": 64, "faults": {"closed": 16, "gone": 48}, "last_words": "no weights here"}
     evidence.document(ladder, "reload/faults.json", {"flow": failed})
@@ -124,6 +137,20 @@ def test_what_its_maker_does_not_declare_is_missing_from_the_card(ladder):
     evidence.record(ladder)
     answer = of_flow(judge(ladder, "B"), "unpinned_items")
     assert answer.verdict == "FAIL" and "architecture, threads" in answer.caveat
+
+
+@pytest.mark.parametrize("unmatched", [EXCEPTION, None])
+def test_another_split_of_our_data_is_refused_with_and_without_an_exception(ladder, unmatched):
+    def another(found):
+        found["flow"]["card"]["split"] = "c" * 64
+
+    bring(ladder, unmatched=unmatched)
+    assert of_flow(judge(ladder, "B"), "unpinned_items").verdict == "PASS"
+    evidence.edit_document(ladder, "reload/identity.json", another)
+    evidence.record(ladder)
+    answer = of_flow(judge(ladder, "B"), "unpinned_items")
+    assert (answer.verdict, answer.measured) == ("FAIL", 1.0)
+    assert answer.caveat.startswith("split: not that of the audited dataset")
 
 
 def test_other_data_are_told_by_exception_and_unpinned_without(ladder):

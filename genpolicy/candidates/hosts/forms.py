@@ -1,0 +1,86 @@
+"""Is a file of the form that its kind needs? Read, and never run."""
+
+import symtable
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+
+from genpolicy.candidates.hosts.kinds import LeRobotEntry, ScriptedEntry
+from genpolicy.candidates.wire.entry import Entry
+from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.integrity.documents import read_json
+
+
+def require_forms(entry: Entry, folder: Path) -> None:
+    """Refuse files of another form than their kind needs, as far as reading them tells.
+
+    Programs and checkpoints are loaded by a child besides: see `loadable`.
+
+    Args:
+        entry: What it is; its files are verified.
+        folder: Of the entry's file.
+
+    Raises:
+        ConfigError: A module without the function; documents or weights of LeRobot that are none.
+    """
+    if isinstance(entry, ScriptedEntry):
+        _require_function(folder / entry.file, entry.function.partition(":")[2])
+    elif isinstance(entry, LeRobotEntry):
+        for name in entry.essential(folder):
+            read = _require_document if name.endswith(".json") else _require_weights
+            read(folder / name)
+
+
+def _require_function(path: Path, name: str) -> None:
+    """By the names that the module binds: to import it would run it."""
+    try:
+        table = symtable.symtable(path.read_bytes().decode(), str(path), "exec")
+    except (SyntaxError, ValueError) as error:
+        raise ConfigError(
+            where=str(path),
+            found=f"no Python module ({error})",
+            expected="one that can be imported",
+            action="Correct it, and write its hash into `files`.",
+        ) from error
+    bound = name in table.get_identifiers() and (
+        (symbol := table.lookup(name)).is_assigned() or symbol.is_imported()
+    )
+    if not bound:
+        raise ConfigError(
+            where=str(path),
+            found=f"a module without the function {name}",
+            expected="`function: module:name` of the entry",
+            action="Name a function of the module.",
+        )
+
+
+def _require_document(path: Path) -> None:
+    try:
+        found = read_json(path)
+    except BadInputError as error:
+        raise ConfigError(
+            where=error.where,
+            found=error.found,
+            expected=f"{error.expected}, as LeRobot writes it",
+            action="Save the policy again with LeRobot's `save_pretrained`.",
+        ) from error
+    if not isinstance(found, dict):
+        raise ConfigError(
+            where=str(path),
+            found=f"JSON of type {type(found).__name__}",
+            expected="a map, as LeRobot writes it",
+            action="Save the policy again with LeRobot's `save_pretrained`.",
+        )
+
+
+def _require_weights(path: Path) -> None:
+    try:
+        with safe_open(path, framework="numpy"):
+            return
+    except SafetensorError as error:
+        raise ConfigError(
+            where=str(path),
+            found=f"no file of tensors ({error})",
+            expected="safetensors, as LeRobot writes them",
+            action="Save the policy again with LeRobot's `save_pretrained`.",
+        ) from error
