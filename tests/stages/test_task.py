@@ -42,7 +42,8 @@ def bring(workspace, edit):
         ({"action": JOINTS}, "6 joints, expected 7"),
         ({"address": "ws://192.168.0.7:8000"}, "192.168.0.7, another machine"),
         ({"address": "nonsense"}, "'nonsense', expected ws://HOST:PORT"),
-        ({"kind": "torch", "address": None, "program": "weights.bin", "stochastic": False},
+        ({"kind": "torch", "address": None, "program": "weights.bin", "stochastic": False,
+          "start_timeout_s": 300.0},
          "refused by its host"),
     ],
 )  # fmt: skip

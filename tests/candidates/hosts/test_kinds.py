@@ -87,7 +87,7 @@ def test_an_unknown_kind_names_the_known_ones(written):
         ("trained", {"observation": {"observation": {**OBSERVED, "unit": "mm"}}}, "lengths in m"),
         ("trained", {"observation": {"observation": {**OBSERVED, "history": 1}}}, "its 2 last"),
         ("scripted", {"function": "os.path:join"}, "pattern"),
-        ("torch", {"address": "ws://127.0.0.1:1"}, "Extra inputs"),
+        ("torch", {"address": "ws://127.0.0.1:1"}, "fields of a candidate"),
         ("torch", {"noise": {**NOISE, "stream": "12"}}, "pattern"),
     ],
 )

@@ -11,6 +11,7 @@ from genpolicy.integrity.hashing import sha256_file
 from tests.candidates.conftest import ENTRY
 from tests.candidates.hosts.conftest import NOISE
 
+PATIENT = {"start_timeout_s": 300.0}
 OBSERVED = ENTRY["observation"]["observation"]
 
 
@@ -20,7 +21,7 @@ def require(path, task):
 
 def with_bytes(write, kind, name, data):
     """An entry that pins other bytes of one of its files."""
-    path = write(kind)
+    path = write(kind, **PATIENT)
     (path.parent / name).write_bytes(data)
     files = {each: sha256_file(path.parent / each) for each in read_entry(path).files}
     text = path.read_text()
@@ -32,7 +33,7 @@ def with_bytes(write, kind, name, data):
 
 @pytest.mark.parametrize("kind", ["torch", "onnx"])
 def test_a_program_of_its_entry_s_ports_is_loaded(written, task, kind):
-    require(written(kind), task)
+    require(written(kind, **PATIENT), task)
 
 
 @pytest.mark.parametrize(
@@ -44,7 +45,7 @@ def test_a_program_of_its_entry_s_ports_is_loaded(written, task, kind):
 )
 def test_other_shapes_or_names_than_the_entry_s(written, task, changes, told):
     with pytest.raises(ConfigError, match=rf"torch\.yaml.*refused by its host.*{told}"):
-        require(written("torch", **changes), task)
+        require(written("torch", **changes, **PATIENT), task)
 
 
 def test_a_pickle_is_no_program_and_is_not_opened(written, task, tmp_path):

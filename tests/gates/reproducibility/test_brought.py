@@ -14,6 +14,8 @@ from gates.reproducibility.settings import MATCHING
 from gates.settings import WAIVED
 from genpolicy.candidates.conformance.finding import OF_ANSWERS
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.split import split_sha256
+from genpolicy.integrity.hashing import sha256_file
 
 FINDINGS = [
     {"name": name, "judged": "holds", "gate": "B", "said": "as it should"} for name in OF_ANSWERS
@@ -22,6 +24,7 @@ ANSWERED = {
     "episodes": 40, "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
     "counts_evaluations": True, "most_candidates": 4, "findings": FINDINGS,
 }  # fmt: skip
+SPLIT = {"split": {"rule": "episodes", "sha256": "5" * 64}}
 EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}
 ENTRY = "own/flow.yaml"
 
@@ -41,6 +44,7 @@ def bring(root, *, unmatched, change=None, document=None, findings=None, told=No
             found[name].pop("flow")
 
     evidence.edit_document(root, "train_generators/matched.json", untrained)
+    split(root)
     identity = {}
     evidence.edit_document(
         root, "reload/identity.json", lambda found: identity.update(found["flow"])
@@ -60,6 +64,20 @@ def bring(root, *, unmatched, change=None, document=None, findings=None, told=No
         lambda found: found["flow"].update({"seed": identity["seed"][:1], **(change or {})}),
     )  # fmt: skip
     evidence.record(root)
+
+
+def split(root):
+    """Let the dataset have a split: its hash is another one then, wherever it is named."""
+    place = root / "artifacts"
+    before = sha256_file(place / "ingest/manifest.json")
+    evidence.edit_document(root, "ingest/manifest.json", lambda found: found.update(SPLIT))
+    now = sha256_file(place / "ingest/manifest.json")
+    for path in (place / "reload/identity.json", place / "train_generators/matched.json"):
+        path.write_text(path.read_text().replace(before, now))
+    evidence.edit_document(
+        root, "reload/identity.json",
+        lambda found: found["flow"]["card"].update(split=split_sha256(SPLIT)),
+    )  # fmt: skip
 
 
 def of_flow(report, name):
