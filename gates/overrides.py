@@ -2,8 +2,7 @@
 
 They stand in `overrides.yaml`, apart from `params.yaml`: who commits to that made the yardstick,
 and who overrides a limit for a candidate must not have made it. An exception names another limit,
-not a verdict: what is measured beyond it fails, and what is not measured stays so. None goes
-beyond a bound of `gates.floors`, in a rehearsal neither.
+not a verdict: beyond it fails, not measured stays so. None goes beyond `gates.floors`, ever.
 
 What is said here is a function of files, without a clock. Whether the person may, and whether the
 last day is over, ask those who act on a report (`gates.overriders`).
