@@ -5,3 +5,12 @@ CHECKPOINT_ONLY = (
     "the method, and another training of it may pass or fail."
 )
 IN_SHORT = "this checkpoint only"
+SHOWN = "shown, not judged"
+"""Of a number beside the one that is held against a limit."""
+MEDIAN_PASSES = "median of the neighbours passes in"
+"""Before the situations in which it does, and how many there are."""
+
+
+def trainings(seeds: int) -> str:
+    """Of how many trainings a number is."""
+    return f"of {seeds} training seed{'s' * (seeds > 1)}"

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from gates.closeness import by_room, closeness
+from gates.closeness import BY_CHANCE, by_room, closeness
 from gates.doubt import MOST_NAMED, Doubt, about, named
 from gates.doubts_of_evidence import (
     an_average,
@@ -20,6 +20,7 @@ from gates.doubts_of_evidence import (
     not_testable,
     not_visited,
     one_seed,
+    simpler_rule,
     untried,
 )
 from gates.overrides import is_said
@@ -126,17 +127,22 @@ def _stopped(report: GateReport) -> Iterator[Doubt]:
 
 
 def _near(report: GateReport) -> Iterator[Doubt]:
-    """What holds by less than a tenth of its limit may be broken by the next draw."""
+    """What holds with next to no room, by the rule of `gates.closeness`."""
     held = [near for near in by_room(list(report.criteria)) if near.near]
     for near in held:
         end = "at the worse end of its interval" if near.worse_end else "at a point"
-        used = f"{100 * near.used:.3g} % of its limit is used up, {end}"
+        used = f"{100 * near.used:.3g} % of its room to the limit is used up, {end}"
+        used += f"; {BY_CHANCE}" if near.chance else ""
         yield about(report, "near its limit", near.answer, used)
 
 
 def _at_a_point(report: GateReport) -> Iterator[Doubt]:
     """A number without an interval holds for the very episodes that were drawn."""
-    points = [c for c in report.criteria if c.interval is None and closeness(c) is not None]
+    points = [
+        c
+        for c in report.criteria
+        if c.verdict == "PASS" and c.interval is None and closeness(c) is not None
+    ]
     ids = tuple(dict.fromkeys(c.id for c in points))
     if ids:
         text = f"{len(ids)} criteria hold for what was drawn, without an interval: {named(ids)}"
@@ -173,6 +179,7 @@ RULES: Sequence[Callable[[GateReport], Iterator[Doubt]]] = (
     _stopped,
     cold_start,
     an_average,
+    simpler_rule,
     few_units,
     one_seed,
     declared,

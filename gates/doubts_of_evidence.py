@@ -7,6 +7,7 @@ settings. So a card repeats them from the bytes that are signed, whatever else l
 import re
 from collections.abc import Iterator
 
+from gates.claim import MEDIAN_PASSES, SHOWN, trainings
 from gates.doubt import Doubt, about, named
 from gates.report import Answer, GateReport
 from gates.reproducibility.timing import DECLARED
@@ -25,6 +26,14 @@ REPEATED = "times"
 UNTRIED = re.compile(r"(?:not measured: )?(not exercised|hardly exercised|not asked)\b")
 """How the caveat of a criterion begins of which the evidence holds no case, or hardly one."""
 LACKED = "of them not asked of this task: "
+ONCE = re.compile(rf"\b{trainings(1)}\b(?!s)")
+"""In caveats of what was trained with one seed."""
+MEDIAN = re.compile(rf"{MEDIAN_PASSES} (?:[\d.]+ % \()?(none|[\d,]+) of ([\d,]+)\)?")
+"""In the caveat that says how often the median of the neighbours passes."""
+ONE_MODE = re.compile(rf"; (\S+) (?:in )?([\d.]+)( %)? \({SHOWN}: with")
+"""In the caveat that says how often a policy of one mode acts validly."""
+OFTEN = 0.5
+"""From this share on a rule does it as often as not, which is the limit of the judged ones."""
 WAIVED_HERE = "waived_checks"
 """Setting of Gate A that names questions which its data could not be asked."""
 
@@ -97,6 +106,33 @@ def an_average(report: GateReport) -> Iterator[Doubt]:
             yield about(report, "an average", answer, text)
 
 
+def simpler_rule(report: GateReport) -> Iterator[Doubt]:
+    """A rule that nobody has to train, or one mode alone, that is shown and not judged.
+
+    Both are valid wherever each mode is, so that a gate that judged them could not pass; whoever
+    signs must know that they are.
+    """
+    kind = "a simpler rule passes"
+    for answer in report.criteria:
+        found = MEDIAN.search(answer.caveat)
+        passed, of = (_count(found[1]), _count(found[2])) if found else (0, 0)
+        if found and of and passed >= OFTEN * of:
+            text = f"the point-wise {found[0]} ({SHOWN}): it needs no training"
+            yield about(report, kind, answer, text)
+        found = ONE_MODE.search(answer.caveat)
+        share = float(found[2]) / (100.0 if found[3] else 1.0) if found else 0.0
+        if found and share >= OFTEN:
+            said = f"{found[1]} acts validly in {100.0 * share:.3g} % of the situations ({SHOWN})"
+            yield about(
+                report, kind, answer, f"with one mode alone {said}; Gate D asks it in motion"
+            )
+
+
+def _count(said: str) -> int:
+    """A count as sentences write it: `1,080`, `none`."""
+    return 0 if said == "none" else int(said.replace(",", ""))
+
+
 def few_units(report: GateReport) -> Iterator[Doubt]:
     """A number of few units is one of which little can be said, whatever it is."""
     fewest: dict[str, tuple[int, str]] = {}
@@ -115,10 +151,12 @@ def few_units(report: GateReport) -> Iterator[Doubt]:
 
 def one_seed(report: GateReport) -> Iterator[Doubt]:
     """A training drawn once: what another draw gives, nobody has seen."""
-    who = [c.candidate or "" for c in report.criteria if " of 1 training seed;" in c.caveat]
-    if who:
-        text = f"{named(who)}: trained once; what another training seed gives was not seen"
-        yield Doubt(report.gate, "one training seed", text, ("unmatched_starts",))
+    once = [c for c in report.criteria if ONCE.search(c.caveat)]
+    if once:
+        who = list(dict.fromkeys(c.candidate for c in once if c.candidate))
+        said = named(who) or "the simpler policies that this gate judges"
+        text = f"{said}: trained once; what another training seed gives was not seen"
+        yield Doubt(report.gate, "one training seed", text, (once[0].id,))
 
 
 def declared(report: GateReport) -> Iterator[Doubt]:

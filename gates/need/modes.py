@@ -5,6 +5,7 @@ import pandas as pd
 
 from gates.bounds import share_interval
 from gates.cause import CauseName
+from gates.claim import MEDIAN_PASSES, SHOWN
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.need.cause import as_the_cause, asked, found_cause
@@ -135,8 +136,7 @@ def _median(evidence: Evidence, settings: NeedSettings) -> str:
     """
     _, rows = _compared(evidence, settings, "median")
     passed = int(np.sum(flags(rows, "median_admissible")))
-    share = share_of(passed, len(rows))
-    return f"the median of the neighbours passes in {share} (shown, not judged)"
+    return f"the {MEDIAN_PASSES} {share_of(passed, len(rows))} ({SHOWN})"
 
 
 def _compared(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from gates.bounds import counted_interval, share_interval
+from gates.claim import SHOWN, trainings
 from gates.criterion import Measured, criterion
 from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
 from gates.may_differ import unmatched
@@ -91,6 +92,7 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     confidence = 1.0 - (1.0 - settings.confidence) / len(settings.remedies)
     bounds = []
     subset = Subset(MODES, (is_one("convention", *settings.deployed_conventions), TWO_MODES))
+    seeds: set[int] = set()
     for method in (*settings.remedies, settings.one_mode):
         rows = subset.of(evidence.of(MODES, ModeRow, method))
         if len(rows) == 0:
@@ -102,15 +104,17 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
             favourable=False,
         )
         bounds.append((upper, lower, share, method, rows))
+        seeds |= set(rows["seed"])
     *judged, shown = bounds
     upper, lower, share, method, rows = max(judged, key=lambda one: one[:4])
     each = ", ".join(f"{name} in {percent(value)}" for _, _, value, name, _ in judged)
     episodes = rows["episode_uuid"].nunique()
     text = (
         f"of {number(len(rows))} situations, with {settings.redraws} candidates in each, acts "
-        f"validly: {each}; upper bound of {method} over {number(episodes)} episodes, level divided "
-        f"among the remedies; {shown[3]} in {percent(shown[2])} (shown, not judged: with one valid "
-        "mode it stays valid, and what it loses shows in motion, at Gate D)"
+        f"validly: {each}, {trainings(len(seeds))}; upper bound of {method} over "
+        f"{number(episodes)} episodes, level divided among the remedies; {shown[3]} in "
+        f"{percent(shown[2])} ({SHOWN}: with one valid mode it stays valid, and what it loses "
+        "shows in motion, at Gate D)"
     )
     counted = f"{episodes} episodes"
     recount = subset.counted(rows)
@@ -305,6 +309,7 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
     deployed: list[tuple[float, str]] = []
     drawn: list[tuple[float, str]] = []
     admissible: dict[str, float] = {}
+    situations: dict[str, int] = {}
     for method in settings.baselines:
         rows = evidence.of(MODES, ModeRow, method)
         rows = rows[numbers(rows, "modes_present") >= 2]
@@ -318,6 +323,7 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
             into = deployed if fixed else drawn
             into.append((float(value), f"{method}, {name}"))
             own = rows[rows["convention"] == name]
+            situations[f"{method}, {name}"] = len(own)
             passed = numbers(own, "admissible").sum() / numbers(own, "samples").sum()
             admissible[f"{method}, {name}"] = float(passed)
     if not deployed:
@@ -329,4 +335,4 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
             f"{who} {percent(value)} ({percent(admissible[who])} of its samples admissible)"
             for value, who in sorted(drawn, reverse=True)
         )
-    return Measured(best, caveat=text)
+    return Measured(best, caveat=text, counted=f"{situations[name]} situations")

@@ -6,10 +6,11 @@ Everything follows from the reports alone, so that the page is the same wherever
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from gates.closeness import Closeness, by_room, closeness
-from gates.doubt import Doubt
+from gates.closeness import BY_CHANCE, Closeness, by_room, closeness, first_what_does_not_hold
+from gates.doubt import Doubt, sentence
 from gates.doubts import of_a_ladder
-from gates.pages.numbers import at_its_end, human, judged_at
+from gates.more import INSIDE
+from gates.pages.numbers import at_its_end, between, beyond, human, judged_at, rests_on
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import decided_by
 
@@ -61,19 +62,21 @@ class Box:
 
 @dataclass(frozen=True)
 class Bar:
-    """Room of one criterion that holds.
+    """Room of one criterion; none is left where it does not hold.
 
     Attributes:
         near: How close it came.
         gate: Its gate.
         measured: As a person reads it.
         limit: Likewise.
+        beyond: How what does not hold stands to its limit; empty where it holds.
     """
 
     near: Closeness
     gate: Gate
     measured: str
     limit: str
+    beyond: str
 
 
 @dataclass(frozen=True)
@@ -132,9 +135,10 @@ def desk_of(reports: Mapping[Gate, GateReport], pending: str = "") -> Desk:
     """
     present = [gate for gate in GATES if gate in reports]
     bars = [
-        Bar(near, gate, at_its_end(near.answer), human(near.answer, near.answer.threshold))
+        Bar(near, gate, at_its_end(c), human(c, c.threshold), beyond(c))
         for gate in present
         for near in by_room(_shown(reports[gate]))
+        for c in (near.answer,)
     ]
     judged = [answer for gate in present for answer in _shown(reports[gate])]
     doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
@@ -146,8 +150,9 @@ def desk_of(reports: Mapping[Gate, GateReport], pending: str = "") -> Desk:
         ),
         doubts=tuple(doubts),
         not_shown=tuple(not_shown),
-        bars=tuple(sorted(bars, key=lambda bar: -bar.near.used)),
-        exact=sum(answer.verdict == "PASS" for answer in judged) - len(bars),
+        bars=tuple(sorted(bars, key=lambda bar: first_what_does_not_hold(bar.near))),
+        exact=sum(answer.verdict == "PASS" for answer in judged)
+        - sum(bar.near.holds for bar in bars),
         parts=tuple(_part(owner, reports) for owner in OWNERS),
     )
 
@@ -173,8 +178,11 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
     if report is None:
         return Asked(title, "It was not judged: `make ladder`.", "")
     decided = decided_by(report)
-    found = f"{decided.question} {_against(decided)} " if decided is not None else ""
-    return Asked(title, f"{found}{report.diagnosis or report.decision}", "")
+    if decided is None:
+        return Asked(title, report.diagnosis or report.decision, "")
+    who = f" ({decided.candidate})" if decided.candidate else ""
+    found = f"{decided.question}{who} {_against(decided)}"
+    return Asked(title, f"{found} {_next(decided, report.decision)}", "")
 
 
 def _passes(report: GateReport | None) -> bool:
@@ -188,9 +196,18 @@ def _against(answer: Answer) -> str:
         return f"Nothing was measured; required {sign} {human(answer, answer.threshold)}."
     found = human(answer, answer.measured)
     if answer.interval is not None:
-        low, high = (human(answer, end) for end in answer.interval)
-        found = f"between {low} and {high}"
+        found = between(answer)
+    found += f" ({rests_on(answer.counted)})" if answer.counted else ""
     return f"Measured {found}; required {sign} {human(answer, answer.threshold)}."
+
+
+def _next(decided: Answer, decision: str) -> str:
+    """What would decide, or what follows; where to look first stands on the gate's page."""
+    if decided.measured is None:
+        return sentence(decided.caveat.removeprefix("not measured: ") or decision)
+    if decided.verdict != "INCONCLUSIVE":
+        return decision
+    return sentence(decided.caveat.rpartition("; ")[2].removeprefix(f"{INSIDE}: "))
 
 
 def _box(gate: Gate, report: GateReport | None) -> Box:
@@ -251,9 +268,9 @@ def remark(answer: Answer) -> str:
     near = closeness(answer)
     if near is None:
         return "holds exactly; there is no room to speak of"
-    used = f"{100 * near.used:.3g} % of the limit is used up"
+    used = f"{100 * near.used:.3g} % of its room to the limit is used up"
     if near.near:
-        return f"near: {used}, and another draw may break it"
+        return f"near: {used}; {BY_CHANCE}" if near.chance else f"near: {used}"
     if answer.interval is None:
         return f"{used}; no interval says how sure that is"
     return used if near.worse_end else f"{used}, at {judged_at(answer)}"

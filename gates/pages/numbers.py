@@ -5,6 +5,7 @@ The unit stands in the criterion's name, and its limit says whether it is a shar
 
 import re
 
+from gates.closeness import EVIDENCE, RATIO
 from gates.pages.guide import unit
 from gates.report import Answer, Recount
 from gates.words import number, three
@@ -19,6 +20,7 @@ RATES = (
     "_deviation",
     "_gap",
     "_reachable",
+    "_effect",
 )
 """How names of shares end."""
 MOST_VALUES = 6
@@ -40,8 +42,8 @@ def human(answer: Answer, value: float | None) -> str:
         return f"{three(1000 * value)} m{suffix}"
     if suffix:
         return f"{three(value)} {suffix}"
-    if "ratio" in answer.id:
-        return f"×{three(value)}"
+    if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
+        return f"×{three(value)}" if RATIO in answer.id else f"{three(value)} to 1"
     if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
         return f"{three(100 * value)} %"
     return three(value) if value != int(value) else f"{int(value):,}"
@@ -103,6 +105,32 @@ def _short(said: str) -> str:
     if len(others) < MOST_VALUES or said.startswith("not ("):
         return said
     return f"{first} or {len(others)} others that criteria.csv lists"
+
+
+def between(answer: Answer) -> str:
+    """An interval, its unit said once: `35.6 to 50.8 %`; empty where there is none."""
+    if answer.interval is None:
+        return ""
+    low, high = (human(answer, end) for end in answer.interval)
+    number, _, suffix = low.partition(" ")
+    return f"{number if suffix and high.endswith(f' {suffix}') else low} to {high}"
+
+
+def beyond(answer: Answer) -> str:
+    """How what does not hold stands to its limit; empty of what holds or has no number.
+
+    `over by 0.8 points`, `short by 3 mm`, `the limit lies inside 35.6 to 50.8 %`.
+    """
+    found, limit = answer.measured, answer.threshold
+    if found is None or limit is None or answer.verdict not in ("FAIL", "INCONCLUSIVE"):
+        return ""
+    if answer.verdict == "INCONCLUSIVE":
+        return f"the limit lies inside {between(answer)}"
+    if answer.id.endswith(EVIDENCE) and found > 0:
+        return f"short by a factor of {three(limit / found)}"
+    text = human(answer, abs(found - limit)).removeprefix("×")
+    text = f"{text.removesuffix(' %')} points" if text.endswith(" %") else text
+    return f"{'over' if answer.comparison == '<=' else 'short'} by {text}"
 
 
 def rests_on(counted: str) -> str:

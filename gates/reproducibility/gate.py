@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from gates.claim import CHECKPOINT_ONLY
+from gates.claim import CHECKPOINT_ONLY, trainings
 from gates.criterion import Measured, criteria_of, criterion
 from gates.distilled import spent
 from gates.engine import GateSpec, Judged
@@ -235,8 +235,7 @@ def samples_difference(
     if unequal and largest == 0.0:
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     seeds = rows["seed"].nunique()
-    text = f"{len(rows)} samples of {seeds} training seed{'s' * (seeds > 1)}, "
-    text += f"{unequal} not bit-equal"
+    text = f"{len(rows)} samples {trainings(seeds)}, {unequal} not bit-equal"
     if candidate not in settings.brought:
         text += _where_drawn(rows, settings.device)
     return Measured(largest, caveat=text)

@@ -105,9 +105,9 @@ def ranked(
     )
     text = (
         f"promote either of {', '.join(left)}, {IN_SHORT}{better}: no paired test "
-        f"tells them apart (an e-value of {most.e_value:.3g} that {most.better} is better than "
-        f"{most.other} by {points(most.gain)} of {settings.measure}; "
-        f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
+        f"tells them apart (evidence at most {most.e_value:.3g} to 1 that {most.better} is better "
+        f"than {most.other}, where {needed:.3g} to 1 is needed; difference {points(most.gain)} of "
+        f"{settings.measure}). The card is drafted for {for_the_card}, whose answers come sooner."
     )
     return Decision(text, promoted=for_the_card)
 

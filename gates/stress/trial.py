@@ -2,12 +2,14 @@
 
 import math
 
+from gates.claim import trainings
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
 from gates.verdicts import rounded
 from gates.words import percent
 from genpolicy.evidence.documents.stress import POWER, Power
+from genpolicy.evidence.stress.tables import POWER_TRIALS
 
 
 @criterion(
@@ -22,7 +24,7 @@ def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: st
     own = _starts(evidence, settings, candidate)
     unmatched = {name: len(own ^ _starts(evidence, settings, name)) for name in settings.baselines}
     seeds = rollouts(evidence, settings, candidate)["seed"].nunique()
-    text = f"{len(own)} starts by state hash, of {seeds} training seed{'s' * (seeds > 1)}; "
+    text = f"{len(own)} starts by state hash, {trainings(seeds)}; "
     text += ", ".join(f"{name} {n}" for name, n in unmatched.items())
     return Measured(float(sum(unmatched.values())), caveat=text)
 
@@ -103,7 +105,7 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     sound = rounded(back) >= asked
     if sound and not promote >= asked:
         raise MissingEvidenceError(f"too few starts to find the planned effect: {text}")
-    return Measured(min(promote, back), caveat=text)
+    return Measured(min(promote, back), caveat=text, counted=f"{POWER_TRIALS} simulated trials")
 
 
 @criterion(

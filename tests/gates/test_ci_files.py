@@ -77,6 +77,25 @@ def test_a_page_of_another_ladder_is_red_in_the_list_too(ladder, _run):
     assert code == 3 and "index.html is another page" in failure.get("message")
 
 
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_workflow_shows_the_markdown_of_every_gate_that_was_judged(ladder, name):
+    """Also where a step before it is red: that is when somebody reads it."""
+    workflow = yaml.safe_load((FILES / f"{name}.yml").read_text())
+    if name == "github":
+        (step,) = [s for s in workflow["jobs"]["gates"]["steps"] if "gate_*.md" in s.get("run", "")]
+        assert step["if"] == "always()" and step["run"].strip().endswith(
+            '>> "$GITHUB_STEP_SUMMARY"'
+        )
+        said = step["run"]
+        assert said.index("gate_*.md") < said.index("report diff"), "which may have nothing to say"
+    else:
+        said = "\n".join(workflow["gates"]["after_script"])  # runs whatever the script did
+    (pattern,) = re.findall(r"^\s*cat (\S+)", said, re.MULTILINE)
+    shown = {path.name for path in ladder.glob(pattern)}
+    assert shown == {f"gate_{gate}.md" for gate in "abcd"}
+    assert all((ladder / f"reports/{file}").read_text().startswith("# Gate ") for file in shown)
+
+
 def test_the_difference_that_is_shown_runs(ladder, monkeypatch, capsys):
     monkeypatch.chdir(ladder)
     (words,) = [words for words in ours("github") if words[0] == "report"]

@@ -5,10 +5,13 @@ import re
 import evidence
 import pytest
 
+from gates.pages.numbers import human
 from gates.proof import judge
 from gates.writing import write_gate, write_index
 
-UNITS = "episodes|situations|processes|observations|candidates|starts|replays"
+UNITS = (
+    "episodes|situations|processes|observations|candidates|starts|replays|chunks|simulated trials"
+)
 COUNTED = re.compile(rf"\d+( of \d+| and \d+)? ({UNITS})( of the rarer mode)?")
 
 
@@ -17,6 +20,19 @@ def test_an_interval_says_how_many_independent_units_it_is_of(ladder, gate):
     answers = [c for c in judge(ladder, gate).criteria if c.interval is not None]
     assert answers
     assert [c.id for c in answers if not COUNTED.fullmatch(c.counted)] == []
+
+
+OF_NO_UNITS = {"parameter_budget_deviation", "strata_effect"}
+"""Shares that count nothing: of the parameters of a network, and none where no stratum explains."""
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_a_share_says_how_many_it_is_of_also_without_an_interval(ladder, gate):
+    shares = [c for c in judge(ladder, gate).criteria
+              if c.measured is not None and human(c, c.measured).endswith(" %")]  # fmt: skip
+    assert shares
+    unsaid = [c.id for c in shares if not COUNTED.fullmatch(c.counted)]
+    assert set(unsaid) <= OF_NO_UNITS
 
 
 def test_a_share_names_the_units_that_it_is_of(ladder):

@@ -45,7 +45,8 @@ def test_a_limit_moved_to_what_was_measured_is_near(ladder):
     report = judge(ladder, "A")
     assert "chunking_valid_share" in _near(report)
     (text,) = [d.text for d in doubts_of(report) if d.criteria == (held.id,)]
-    assert "95.2 % of its limit is used up, at the worse end of its interval." in text
+    assert "95.2 % of its room to the limit is used up, at the worse end of its interval;" in text
+    assert "another draw may break it." in text  # 5 of 105 are less than half of the interval
 
 
 def test_a_number_without_an_interval_is_said_to_be_one(ladder):
@@ -133,7 +134,7 @@ def test_what_a_card_is_signed_in_spite_of_speaks_of_its_candidate(ladder):
     )
     assert sum(d.kind == "near its limit" for d in doubts_of(narrow)) == 2
     said = for_a_card(narrow, promoted)
-    near_texts = [text for text in said if "95 % of its limit is used up" in text]
+    near_texts = [text for text in said if "95 % of its room to the limit is used up" in text]
     assert len(near_texts) == 1 and f"({promoted})" in near_texts[0]
     assert f"Gate D, stopped here: {other}: fell" in said
     assert not any(caveat in text for caveat in report.caveats for text in said)

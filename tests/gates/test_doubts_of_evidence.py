@@ -1,5 +1,6 @@
 """Each rule where it speaks and where it must not, on criteria as gates write them."""
 
+import evidence
 import pytest
 from test_differences import REPORT
 from test_verdicts import criterion
@@ -7,7 +8,8 @@ from test_verdicts import criterion
 from gates.card.card import caveats_of
 from gates.doubt import Doubt
 from gates.doubts import doubts_of, for_a_card
-from gates.doubts_of_evidence import FEW
+from gates.doubts_of_evidence import FEW, ONE_MODE
+from gates.proof import judge
 from gates.stress.contact import UNTOUCHED
 
 
@@ -166,6 +168,56 @@ def test_a_candidate_that_was_trained_once_is_named():
     assert doubt.text.startswith("flow, act: trained once")
     assert not said("one training seed", answer(caveat=one.replace("1 training seed", "11 training"
                                                                    " seeds")))  # fmt: skip
+
+
+@pytest.mark.parametrize("caveat", [
+    "bc_noise with 0.43 of 223 situations, 4 candidates each (a 0.4), of 1 training seed; upper",
+    "80 samples of 1 training seed, 0 not bit-equal",
+])  # fmt: skip
+def test_gates_a_and_b_say_that_they_saw_one_training_too(caveat):
+    (doubt,) = said("one training seed", answer(candidate=None, name="remedy", caveat=caveat))
+    assert doubt.text.startswith("the simpler policies that this gate judges: trained once")
+    assert doubt.criteria == ("remedy",) and doubt.candidate == ""
+    many = caveat.replace("1 training seed", "3 training seeds")
+    assert not said("one training seed", answer(candidate=None, caveat=many))
+
+
+def test_the_ladder_of_one_seed_says_so_at_each_gate_that_has_trained_policies(ladder):
+    for gate in "ABD":
+        report = judge(ladder, gate)
+        (found,) = [d for d in doubts_of(report) if d.kind == "one training seed"]
+        assert len(found.criteria) == 1
+
+
+@pytest.mark.parametrize(("caveat", "passes"), [
+    ("share 1; the median of the neighbours passes in 349 of 360 (shown, not judged)", True),
+    ("share 1; the median of the neighbours passes in 96.9 %, 349 of 360 situations (shown", True),
+    ("share 1; the median of the neighbours passes in 179 of 360 (shown, not judged)", False),
+    ("0.4 of 9; bound; one_mode_bc 0.987 (shown, not judged: with one valid mode it", True),
+    ("0.4 of 9; bound; one_mode_bc in 98.7 % (shown, not judged: with one valid mode it", True),
+    ("0.4 of 9; bound; one_mode_bc 0.487 (shown, not judged: with one valid mode it", False),
+    ("0.4 of 9; bound", False),
+])  # fmt: skip
+@pytest.mark.parametrize("verdict", ["PASS", "INCONCLUSIVE"])
+def test_a_simpler_rule_that_is_only_shown_is_a_doubt_where_it_passes(caveat, passes, verdict):
+    found = said("a simpler rule passes", answer(verdict, None, caveat=caveat, interval=(0.0, 1.0)))
+    assert len(found) == passes
+    for doubt in found:
+        how = "passes in 349 of 360" if "median" in caveat else "one_mode_bc acts validly in 98.7 %"
+        assert (how in doubt.text or "349 of 360" in doubt.text) and "not judged" in doubt.text
+
+
+def test_gate_a_writes_what_the_rule_of_simpler_rules_reads(ladder):
+    """By the evidence: wherever the median of all passes, and one mode alone acts validly."""
+    before = [d for d in doubts_of(judge(ladder, "A")) if d.kind == "a simpler rule passes"]
+    evidence.edit_table(ladder, "audit/neighbourhoods.parquet",
+                        lambda f: f.assign(median_admissible=True))  # fmt: skip
+    after = [d for d in doubts_of(judge(ladder, "A")) if d.kind == "a simpler rule passes"]
+    new = [d for d in after if d not in before]
+    assert [d.criteria[0] for d in new] == ["mean_defeated_share"]
+    caveats = {c.id: c.caveat for c in judge(ladder, "A").criteria}
+    assert ONE_MODE.search(caveats["remedy_valid_share"])
+    assert ONE_MODE.search(caveats["remedy_valid_share"])[1] == "one_mode_bc"
 
 
 def test_terms_that_somebody_wrote_down_are_counted_once():

@@ -10,7 +10,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
 from team import Team
 
+from gates.closeness import closeness
 from gates.evidence import Evidence
+from gates.pages import page
 from gates.pages.desk import HEADLINES, desk_of, remark
 from gates.pages.desk_card import papers_of, signing_of
 from gates.proof import judge
@@ -96,10 +98,76 @@ def test_criteria_of_others_than_the_promoted_draw_no_bar(ladder):
 def test_bars_and_exact_ones_are_all_that_hold(ladder):
     found = desk(ladder)
     shown = sum(part.hold for part in found.parts)
-    assert len(found.bars) + found.exact == shown
-    assert [bar.near.used for bar in found.bars] == sorted(
-        (bar.near.used for bar in found.bars), reverse=True
-    )
+    assert len(found.bars) + found.exact == shown and found.bars
+    used = [bar.near.used for bar in found.bars]
+    assert used == sorted(used, reverse=True) and not any(bar.beyond for bar in found.bars)
+
+
+def test_what_does_not_hold_has_the_first_bar_full_and_says_how_far(judged):
+    """The one that decides must not be the one that is missing."""
+    report = judged("A")
+    by_id = {c.id: n for n, c in enumerate(report.criteria)}
+    open_one, broken = by_id["remedy_valid_share"], by_id["clock_residual_s"]
+    criteria = list(report.criteria)
+    criteria[open_one] = criteria[open_one].model_copy(update={
+        "verdict": "INCONCLUSIVE", "measured": 0.508, "interval": (0.356, 0.508), "threshold": 0.5,
+    })  # fmt: skip
+    criteria[broken] = criteria[broken].model_copy(update={
+        "verdict": "FAIL", "measured": 0.013, "threshold": 0.01,
+    })  # fmt: skip
+    changed = report.model_copy(update={"criteria": tuple(criteria), "verdict": "FAIL"})
+    found = desk_of({"A": changed})
+    first, second, *others = found.bars
+    assert (first.near.answer.id, first.beyond) == ("clock_residual_s", "over by 3 ms")
+    assert second.near.answer.id == "remedy_valid_share"
+    assert second.beyond == "the limit lies inside 35.6 to 50.8 %"
+    assert (first.near.used, second.near.used) == (1.0, 1.0)
+    assert all(bar.near.holds for bar in others)
+    assert len(others) + found.exact == sum(part.hold for part in found.parts)
+
+
+def test_the_page_draws_what_does_not_hold_in_red(ladder):
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+    write_gate(ladder, "A")
+    text = (ladder / "reports/index.html").read_text()
+    row = text[text.index('class="bar broken"') :].partition("</tr>")[0]
+    assert 'aria-label="over by 3 action steps"' in row
+    assert '<rect class="used" width="100.0"' in row and "<small>over by 3 action steps" in row
+    assert text.index('class="bar broken"') < text.index('class="bar"')
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"verdict": "FAIL", "measured": 0.6}, "Measured 60 % (9 of 15 episodes); required at most "
+         "50 %. Return to the dataset."),
+        ({"verdict": "INCONCLUSIVE", "measured": 0.508, "interval": (0.356, 0.508),
+          "caveat": "long; the limit lies inside the interval: about 2.3 times as many decide"},
+         "Measured 35.6 to 50.8 % (9 of 15 episodes); required at most 50 %. About 2.3 times as "
+         "many decide."),
+        ({"verdict": "INCONCLUSIVE", "measured": None, "caveat": "not measured: no rows"},
+         "Nothing was measured; required at most 50 %. No rows."),
+    ],
+)  # fmt: skip
+def test_the_asked_box_says_what_was_found_what_is_required_and_what_would_decide(
+    judged, changes, said
+):
+    """Where to look first, and what an audit found beside it, stand on the gate's page."""
+    report = judged("A")
+    own = next(c for c in report.criteria if c.id == "remedy_valid_share")
+    plain = {"threshold": 0.5, "interval": None, "counted": "9 of 15 episodes"}
+    own = own.model_copy(update={**plain, **changes})
+    stopped = report.model_copy(update={
+        "criteria": (own,), "verdict": own.verdict, "decision": "Return to the dataset.",
+        "diagnosis": "First unmet: remedy_valid_share. Baselines: retrain.",
+    })  # fmt: skip
+    assert desk_of({"A": stopped}).asked.text == f"{own.question} {said}"
+
+
+def test_watch_it_says_which_way_was_measured_and_which_was_commanded():
+    """As `genpolicy.replay.film` draws: the hand where it was measured, the way as commanded."""
+    template = (Path(page.__file__).parent / "templates/index.html").read_text()
+    assert "The hand stands where it was measured; blue: the way that was commanded;" in template
 
 
 def test_each_owner_finds_what_is_open(ladder):
@@ -129,9 +197,17 @@ def test_each_owner_finds_what_is_open(ladder):
         ),
         ({"verdict": "FAIL", "measured": 5.0}, "c"),
         ({"verdict": "FAIL", "caveat": ""}, "nothing was recorded that answers it"),
-        ({"measured": 1.9}, "near: 95 % of the limit is used up, and another draw may break it"),
-        ({"measured": 1.0}, "50 % of the limit is used up; no interval says how sure that is"),
-        ({"measured": 1.0, "interval": (0.5, 1.0)}, "50 % of the limit is used up"),
+        ({"measured": 1.9}, "near: 95 % of its room to the limit is used up"),
+        (
+            {"measured": 1.5, "interval": (0.4, 1.5)},
+            "near: 75 % of its room to the limit is used up; what is left is less than half of "
+            "its interval, so that another draw may break it",
+        ),
+        (
+            {"measured": 1.0},
+            "50 % of its room to the limit is used up; no interval says how sure that is",
+        ),
+        ({"measured": 1.0, "interval": (0.5, 1.0)}, "50 % of its room to the limit is used up"),
         ({"measured": 0.0, "threshold": 0.0}, "holds exactly; there is no room to speak of"),
     ],
 )  # fmt: skip
@@ -187,11 +263,11 @@ def test_every_number_of_the_desk_is_one_of_the_reports(ladder, spoilt):
             assert _read(text.removeprefix(f"{c.candidate} ")) == (_side(c), _close(c.measured))
     for bar in found.bars:
         c = bar.near.answer
-        assert c in reports[bar.gate].criteria and c.verdict == "PASS"
+        assert c in reports[bar.gate].criteria and bar.near.holds == (c.verdict == "PASS")
         assert _read(bar.measured) == (_side(c), _close(c.measured))
         assert _read(bar.limit) == ("", _close(c.threshold))
-        ends = (c.measured, c.threshold) if c.comparison == "<=" else (c.threshold, c.measured)
-        assert bar.near.used == pytest.approx(max(ends[0], 0.0) / ends[1])
+        assert bool(bar.beyond) != bar.near.holds
+        assert bar.near == closeness(c)
 
 
 def test_each_owner_finds_all_of_theirs_and_nobody_elses(ladder):
@@ -222,10 +298,8 @@ def _known(entry):
 
 
 def _used(c):
-    """Above 1 what does not hold, then the share of the limit, below 0 what has none."""
+    """Above 1 what does not hold, then the share of the room, below 0 what has none."""
     if c.verdict != "PASS":
         return 2.0
-    exact = c.comparison == ">=" and c.threshold == c.measured == 1
-    if exact or c.measured is None or not c.threshold or c.threshold <= 0:
-        return -1.0
-    return c.threshold / c.measured if c.comparison == ">=" else max(c.measured, 0.0) / c.threshold
+    near = closeness(c)
+    return -1.0 if near is None else near.used

@@ -1,9 +1,20 @@
 """Numbers as people read them, and what was held against a limit."""
 
+import re
+
 import pytest
 from test_verdicts import criterion
 
-from gates.pages.numbers import at_its_end, human, judged_at, limit_said, recounted, rests_on
+from gates.pages.numbers import (
+    at_its_end,
+    between,
+    beyond,
+    human,
+    judged_at,
+    limit_said,
+    recounted,
+    rests_on,
+)
 from gates.report import Recount
 
 
@@ -22,7 +33,9 @@ def of(**changes):
         ("warm_latency_ratio_upper", 1.5, 1.26, "×1.26"),
         ("latent_dependence_p", 0.05, 0.034, "0.034"),
         ("stub_stale", 0, 0.0, "0"),
-        ("promotion_e_value", 60, 61.234, "61.2"),
+        ("promotion_e_value", 60, 61.234, "61.2 to 1"),
+        ("promotion_e_value", 20, 6843315.4, "6,840,000 to 1"),
+        ("strata_effect", 0.3, 0.11536, "11.5 %"),
         ("told_share", 0.4, None, "not measured"),
         ("held_out_situations", 100, 13345.0, "13,345"),
         ("boundary_jerk_p95_m_s3", 3250, 2031.7, "2,030 m/s³"),
@@ -50,6 +63,46 @@ def test_without_an_interval_a_point_is_judged_and_without_a_number_nothing():
     assert judged_at(of(measured=0.2)) == "a point" and judged_at(of(measured=None)) == ""
     assert at_its_end(of(id="a_share", threshold=1.0, measured=0.2)) == "20 %"
     assert at_its_end(of(measured=None, interval=(0.0, 1.0))) == "not measured"
+
+
+PLAIN = re.compile(
+    r"latent_dependence_p|.*(situations|keys|items|weights|mismatches|checks|defects|missing|starts"
+    r"|invalid|stale|violations|miscounted|undetected|answers|accounted|matched|isolated|mismatch"
+    r"|error|complete|within_limits|conformance|accepted|passed|valid|independent|expired|signed"
+    r"|difference)"
+)
+"""Counts, questions with yes or no, a probability, and differences of normalized actions."""
+
+
+def test_each_number_that_is_no_count_says_what_it_is(judged):
+    """A share without a percent sign reads like a number of something."""
+    for gate in "ABCDE":
+        for c in judged(gate).criteria:
+            said = human(c, c.threshold)
+            if not re.search(r" (%|m?s|mm|m|N|m/s³|action steps|to 1)$|^×", said):
+                assert PLAIN.fullmatch(c.id), (c.id, said)
+
+
+@pytest.mark.parametrize(("name", "comparison", "measured", "limit", "interval", "said"), [
+    ("told_share", "<=", 0.508, 0.5, None, "over by 0.8 points"),
+    ("some_lower", ">=", 0.508, 0.6, None, "short by 9.2 points"),
+    ("clock_residual_s", "<=", 0.013, 0.01, None, "over by 3 ms"),
+    ("warm_latency_ratio_upper", "<=", 1.75, 1.5, None, "over by 0.25"),
+    ("stub_stale", "<=", 3.0, 0.0, None, "over by 3"),
+    ("promotion_e_value", ">=", 1.6, 20.0, None, "short by a factor of 12.5"),
+    ("told_share", "<=", 0.508, 0.5, (0.356, 0.508), "the limit lies inside 35.6 to 50.8 %"),
+    ("latency_p95_s", "<=", 1.2, 1.0, (0.9, 1.2), "the limit lies inside 900 ms to 1.2 s"),
+])  # fmt: skip
+def test_what_does_not_hold_says_how_far_from_its_limit(
+    name, comparison, measured, limit, interval, said
+):
+    verdict = "INCONCLUSIVE" if interval else "FAIL"
+    found = of(id=name, comparison=comparison, measured=measured, threshold=limit,
+               interval=interval, verdict=verdict)  # fmt: skip
+    assert beyond(found) == said
+    assert not beyond(found.model_copy(update={"verdict": "PASS"}))
+    assert not beyond(found.model_copy(update={"measured": None}))
+    assert between(found.model_copy(update={"interval": None})) == ""
 
 
 def test_a_limit_is_said_in_the_unit_of_its_number():

@@ -121,6 +121,9 @@ def test_a_pair_is_told_apart_from_the_evidence_that_is_needed_on(
     found = choose(Judged(Evidence(ladder), settings, (), "PASS", verdicts))
     assert found.promoted == promoted
     assert found.text.startswith(decision)
+    said = "(evidence at most 20 to 1 that diffusion is better than flow, where 20 to 1 is needed; "
+    assert ("difference 10 points)" in found.text) == (promoted == "flow")
+    assert promoted != "flow" or said in found.text
 
 
 @pytest.mark.parametrize(("change", "promoted"), [({}, "flow"), ({"measured": None}, "diffusion")])
