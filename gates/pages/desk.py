@@ -173,7 +173,7 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
         return Asked(title, "The card says where, how fast, and until when.", "")
     if stopped == "E" and promoted:
         title = f"Asked of you: let {promoted} move a robot, supervised, inside one envelope?"
-        return Asked(title, reports["D"].decision, pending)
+        return Asked(title, sentence(reports["D"].decision), pending)
     title = f"Nothing is asked of you yet: the ladder stops at gate {stopped}, {NAMES[stopped]}"
     if report is None:
         return Asked(title, "It was not judged: `make ladder`.", "")

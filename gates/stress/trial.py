@@ -9,7 +9,10 @@ from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, suc
 from gates.verdicts import rounded
 from gates.words import percent
 from genpolicy.evidence.documents.stress import POWER, Power
-from genpolicy.evidence.stress.tables import POWER_TRIALS
+
+SIMULATED = 4000
+"""Trials of one world of the power table, as the stage draws them; the table does not count them.
+Not imported: every gate would stand on all that the stage runs."""
 
 
 @criterion(
@@ -105,7 +108,7 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     sound = rounded(back) >= asked
     if sound and not promote >= asked:
         raise MissingEvidenceError(f"too few starts to find the planned effect: {text}")
-    return Measured(min(promote, back), caveat=text, counted=f"{POWER_TRIALS} simulated trials")
+    return Measured(min(promote, back), caveat=text, counted=f"{SIMULATED} simulated trials")
 
 
 @criterion(

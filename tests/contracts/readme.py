@@ -8,9 +8,17 @@ import json
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from flows.estimate import DOCUMENTED
+from gates.overview import Line, as_text
+from gates.report import GateReport, stage_of
+from gates.verdicts import decided_text
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 BEGIN, END = "<!-- from reports/: begin -->\n", "<!-- from reports/: end -->\n"
+SHOT_BEGIN, SHOT_END = "<!-- of a run: begin -->\n", "<!-- of a run: end -->\n"
 GATES = "ABCDE"
 TOLD = {
     "A": ("multimodal_situations", "mean_defeated_share", "told_share", "chunking_valid_share",
@@ -79,20 +87,45 @@ def number(value: float, name: str) -> str:
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
 
 
-def placed(text: str, made: str) -> str:
+def run(found: dict[str, dict]) -> str:
+    """How long a run takes, as the program says before one, and what a terminal shows behind it.
+
+    Of the table the gates: what the other stages took on a machine is in no report.
+    """
+    _, _, takes = DOCUMENTED.partition(". ")
+    lines = [_line(gate, found.get(gate)) for gate in GATES]
+    *table, _sum_of_no_times = as_text(lines, terminal=True).splitlines()
+    head, *rows = table
+    shown = [head.partition(" time")[0].rstrip(), *rows]
+    return "\n".join([f"{takes}.", "", "```text", *shown, "```", ""])
+
+
+def _line(gate: str, report: dict | None) -> Line:
+    if report is None:
+        return Line(stage_of(gate), "NOT JUDGED", "", None, None)
+    read = GateReport.model_validate_json(json.dumps(report))
+    return Line(stage_of(gate), read.verdict, decided_text(read) or read.decision, None, None)
+
+
+def placed(text: str, made: str, begins: str = BEGIN, ends: str = END) -> str:
     """A text with what is made between its marks.
 
     Raises:
         ValueError: A mark is missing.
     """
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    before, begin, rest = text.partition(begins)
+    _, end, after = rest.partition(ends)
     if not begin or not end:
-        raise ValueError(f"no {BEGIN.strip()} and {END.strip()}")
+        raise ValueError(f"no {begins.strip()} and {ends.strip()}")
     return before + begin + made + end + after
+
+
+def whole(text: str, found: dict[str, dict]) -> str:
+    """The README with all that is made of these reports."""
+    return placed(placed(text, section(found)), run(found), SHOT_BEGIN, SHOT_END)
 
 
 if __name__ == "__main__":
     if sys.argv[1:] != ["--write"]:
         sys.exit("usage: python tests/contracts/readme.py --write")
-    README.write_text(placed(README.read_text(), section(reports())))
+    README.write_text(whole(README.read_text(), reports()))

@@ -12,6 +12,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import readme
 
+from flows.estimate import DOCUMENTED
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 TOP = ("benchmarks", "flows", "gates", "genpolicy", "stages", "tests")
@@ -73,7 +75,7 @@ def test_a_path_that_is_gone_is_found() -> None:
 def test_what_the_readme_says_of_the_default_ladder_is_what_the_reports_say() -> None:
     text, found = README.read_text(), readme.reports()
     assert found, "no report lies in reports/"
-    assert readme.placed(text, readme.section(found)) == text, (
+    assert readme.whole(text, found) == text, (
         "run `python tests/contracts/readme.py --write`, and read the words around it"
     )
 
@@ -86,6 +88,22 @@ def test_a_number_that_moves_is_seen(name: str) -> None:
     item = next(i for i in moved["A"]["criteria"] if i["id"] == "remedy_valid_share")
     item[name] = {"interval": [0.1, 0.2], "verdict": "FAIL"}.get(name, 0.123)
     assert readme.section(moved) != readme.section(found)
+
+
+def test_the_readme_says_how_long_a_run_takes_and_what_a_terminal_shows_after_it() -> None:
+    found = readme.reports()
+    said = readme.run(found)
+    takes, _, shot = said.partition("\n\n")
+    assert takes in f"{DOCUMENTED}." and re.search(r"`make smoke` \d+ to \d+ min", takes)
+    lines = shot.splitlines()
+    assert (lines[0], lines[-1]) == ("```text", "```") and max(map(len, lines)) <= 80
+    states = re.findall(r"^gate_([a-e]) +([A-Z_ ]+)$", shot, re.MULTILINE)
+    assert [(gate.upper(), state) for gate, state in states] == [
+        (gate, found[gate]["verdict"] if gate in found else "NOT JUDGED") for gate in "ABCDE"
+    ]
+    moved = copy.deepcopy(found)
+    moved["A"]["verdict"] = "FAIL"
+    assert readme.run(moved) != said
 
 
 def test_a_row_is_as_a_person_reads_it() -> None:

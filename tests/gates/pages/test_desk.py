@@ -17,7 +17,7 @@ from gates.pages.desk import HEADLINES, desk_of, remark
 from gates.pages.desk_card import papers_of, signing_of
 from gates.proof import judge
 from gates.report import GATES, read_report
-from gates.writing import write_gate
+from gates.writing import write_gate, write_index
 
 
 def desk(ladder):
@@ -126,10 +126,14 @@ def test_what_does_not_hold_has_the_first_bar_full_and_says_how_far(judged):
     assert len(others) + found.exact == sum(part.hold for part in found.parts)
 
 
-def test_the_page_draws_what_does_not_hold_in_red(ladder):
+def test_the_page_draws_what_does_not_hold_in_red_and_says_it_before_any_gain(ladder):
+    write_index(ladder)
+    passed, gain = (ladder / "reports/index.html").read_text(), "the best simple policy, "
+    assert passed.index(gain) < passed.index("<p>Promote ")
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     write_gate(ladder, "A")
     text = (ladder / "reports/index.html").read_text()
+    assert text.index("Measured 4 action steps") < text.index(gain)
     row = text[text.index('class="bar broken"') :].partition("</tr>")[0]
     assert 'aria-label="over by 3 action steps"' in row
     assert '<rect class="used" width="100.0"' in row and "<small>over by 3 action steps" in row

@@ -9,6 +9,7 @@ from editing import cells
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.stress.trial import unmatched_starts, verdict_reachable
+from genpolicy.evidence.stress.tables import POWER_TRIALS
 
 
 def _of(method):
@@ -185,3 +186,8 @@ def test_a_power_table_without_rows_is_missing_evidence(ladder, rows, said):
     evidence.edit_document(ladder, POWER, lambda d: d.update(rows=rows))
     with pytest.raises(MissingEvidenceError, match=said):
         asked(ladder, verdict_reachable, gate="D")
+
+
+def test_the_power_table_rests_on_as_many_trials_as_its_stage_draws(ladder):
+    (reached,) = [c for c in judge(ladder, "D").criteria if c.id == "verdict_reachable"]
+    assert reached.counted == f"{POWER_TRIALS} simulated trials"
