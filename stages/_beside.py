@@ -1,8 +1,8 @@
 """Runs a stage that stands beside the ladder: behind a promotion, and no gate asks for it.
 
 `stages._stage` counts the stages that lead to verdicts, and what trains depends on that file: a
-name more in it would train everything again. A stage of this list writes its folder, leaves with
-the same exit codes, and has its settings in a section of another stage.
+name more in it would train everything again. Such a stage writes its folder, leaves with the same
+exit codes, and has its settings in a section of another stage.
 """
 
 import contextlib
@@ -17,15 +17,12 @@ from genpolicy.errors import GenpolicyError
 from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
 from stages._stage import TIMES, Params, _record, _taken, load_params
 
-BESIDE = {"failure_search": "card.failure_search"}
-"""Their names, and where in `params.yaml` their settings stand."""
-
 
 def main(name: str, work: Callable[[Params], None]) -> NoReturn:
     """Run the body of stage `name` and leave with the exit code that its end deserves.
 
     Args:
-        name: One of `BESIDE`.
+        name: As `dvc.yaml` has it.
         work: Admits, measures, and writes the outputs.
     """
     started = time.perf_counter()
