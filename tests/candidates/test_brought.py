@@ -49,6 +49,24 @@ def test_a_changed_file_is_refused_before_anything_runs(brought, tmp_path):
         require_brought(section, horizons=HORIZONS, root=tmp_path)
 
 
+def test_what_is_wrong_with_a_file_says_what_its_author_can_do(brought, tmp_path):
+    """No stage writes it, so that there is none to run again."""
+    section, weights = brought(), tmp_path / "own" / "weights.bin"
+
+    def action():
+        with pytest.raises(IntegrityError) as error:
+            require_brought(section, horizons=HORIZONS, root=tmp_path)
+        assert "stage" not in error.value.action
+        return error.value.action
+
+    weights.write_bytes(b"weightz")
+    assert "into `files` (weights.bin)" in action()
+    weights.rename(tmp_path / "blob")
+    assert "Put it there" in action()
+    weights.symlink_to(tmp_path / "blob")  # as in a cache of Hugging Face
+    assert "`cp -rL`" in action()
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
