@@ -52,6 +52,23 @@ def test_refused_candidates_are_counted_where_projection_moved_them(planted):
     assert (int(moved), int(refused)) == (int(of), int(of_refused))
 
 
+def test_what_never_came_to_projection_is_counted_where_there_is_some(planted, honest):
+    what = "held-out candidates that never came to projection"
+
+    def change(frame):
+        held = frame.index[of_flow(frame) & (frame["fixture"] == "held_out")]
+        frame.loc[held[:3], "position_change_m"] = np.nan
+        return frame
+
+    look = Look(planted(lambda root: evidence.edit_table(
+        root, "shadow/candidates.parquet", change), ""), FLOW)  # fmt: skip
+    raw_samples(look)
+    assert value(look, what).startswith("3 of ")
+    look = Look(honest, FLOW)
+    raw_samples(look)
+    assert all(one.what != what for one in look.numbers)
+
+
 def test_the_interval_of_a_move_goes_from_its_lower_to_its_upper_end(planted):
     """Moves that differ from episode to episode, so that the two ends are two numbers."""
 

@@ -92,3 +92,14 @@ def test_a_look_repeats_no_reason_why_nothing_is_known(honest):
     look.criteria("D.hold_share_upper", "D.reset_upper")
     assert look.waits_for == ["no D"]
     assert look.unknown == look.numbers == look.causes == look.undecided == []
+
+
+@pytest.mark.parametrize(("state", "not_asked"), [("in order", ("x",)), ("not asked", ())])
+def test_a_walk_of_which_some_was_not_asked_is_not_said_to_hold_whole(honest, state, not_asked):
+    whole = walk(honest, FLOW)
+    for stop in whole.stops:
+        assert stop.not_asked == () and stop.state == "in order"
+    changed = replace(whole.stops[-1], state=state, not_asked=not_asked)
+    partly = replace(whole, stops=(*whole.stops[:-1], changed), behind=())
+    assert "Nothing is red: every place was asked" in walk_text(whole)
+    assert "what was not asked stands at its place" in walk_text(partly)
