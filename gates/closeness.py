@@ -17,7 +17,7 @@ from gates.report import Answer
 
 NEAR = 0.9
 """Share of the room from which on little is left, whatever chance does."""
-RATIO = "ratio"
+RATIO = "_ratio"
 """In names of criteria that are held against no change, which is 1."""
 EVIDENCE = "_e_value"
 """How names of evidence end: so much to 1."""
@@ -49,7 +49,7 @@ class Closeness:
         """Whether another draw of as many units may break what holds.
 
         To the limit it is less than half of the interval. The end of another draw's interval lies
-        about that far from this one in one of ten draws or more.
+        about that far from this one in about one of ten draws.
         """
         answer = self.answer
         if not self.holds or answer.interval is None:

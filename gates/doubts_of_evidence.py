@@ -30,7 +30,7 @@ ONCE = re.compile(rf"\b{trainings(1)}\b(?!s)")
 """In caveats of what was trained with one seed."""
 MEDIAN = re.compile(rf"{MEDIAN_PASSES} (?:[\d.]+ % \()?(none|[\d,]+) of ([\d,]+)\)?")
 """In the caveat that says how often the median of the neighbours passes."""
-ONE_MODE = re.compile(rf"; (\S+) (?:in )?([\d.]+)( %)? \({SHOWN}: with")
+ONE_MODE = re.compile(rf"; (\S+) in ([\d.]+) % \({SHOWN}: with")
 """In the caveat that says how often a policy of one mode acts validly."""
 OFTEN = 0.5
 """From this share on a rule does it as often as not, which is the limit of the judged ones."""
@@ -120,7 +120,7 @@ def simpler_rule(report: GateReport) -> Iterator[Doubt]:
             text = f"the point-wise {found[0]} ({SHOWN}): it needs no training"
             yield about(report, kind, answer, text)
         found = ONE_MODE.search(answer.caveat)
-        share = float(found[2]) / (100.0 if found[3] else 1.0) if found else 0.0
+        share = float(found[2]) / 100.0 if found else 0.0
         if found and share >= OFTEN:
             said = f"{found[1]} acts validly in {100.0 * share:.3g} % of the situations ({SHOWN})"
             yield about(

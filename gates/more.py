@@ -18,6 +18,8 @@ ASTRIDE = f"{INSIDE}: more of the same evidence decides"
 
 MOST = 10.0
 """Times as many, from which on nobody would collect them for this question."""
+LEAST = 1.1
+"""Times as many that are ever said: an end on the limit itself is moved by a few more."""
 
 
 def times_as_many(point: float, interval: tuple[float, float], limit: float) -> float:
@@ -57,7 +59,7 @@ def enough(
     if not times <= MOST:
         return f"so near that {MOST:g} times as many ({counted} now) may not decide"
     # Rounded up: fewer than this would leave the limit inside.
-    shown = math.ceil(10.0 * times) / 10.0
+    shown = max(math.ceil(10.0 * times) / 10.0, LEAST)
     holds = "holds" if margin(point, limit, comparison) >= 0 else "is broken"
     return (
         f"about {shown:g} times as many ({counted} now) show that it {holds}, if they say the same"

@@ -95,11 +95,16 @@ def _rederived(root: Path, rung: Rung) -> Rung:
     return rung
 
 
-def rederive(root: Path, gate: Gate) -> None:
+def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
     """Hold the evidence of a gate against what lies under it: its journals, the rows of a dataset.
 
     What is printed of it is printed again behind that: `dvc commit` records an edited page as
     readily as the one that the gate printed.
+
+    Args:
+        root: Of the ladder.
+        gate: Whose evidence.
+        printed: Whether its page is asked as well.
 
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
@@ -111,7 +116,8 @@ def rederive(root: Path, gate: Gate) -> None:
         BadInputError: A journal or a table cannot be read.
     """
     _evidence(root, gate)
-    _printed(root, gate)
+    if printed:
+        _printed(root, gate)
 
 
 def _evidence(root: Path, gate: Gate) -> None:

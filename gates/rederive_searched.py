@@ -121,6 +121,10 @@ def _asked_again(
                         limit = f"{one.point}, which the search asks for"
                         refuse("E", f"{SEARCHED}: {key}: point", f"{stated.point}", limit)
                     row = _row(task, condition, stated, end)
+                    began = f"{end['start_sha256']}"
+                    if began != row["start_sha256"]:
+                        limit = f"{row['start_sha256']}, at which its point begins"
+                        refuse("E", f"{SEARCHED}: {key}: start of the journal", began, limit)
                     row["worth"] = worth_of(
                         condition,
                         end,

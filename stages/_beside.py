@@ -18,17 +18,19 @@ from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
 from stages._stage import TIMES, Params, _record, _taken, load_params
 
 
-def main(name: str, work: Callable[[Params], None]) -> NoReturn:
+def main(name: str, work: Callable[[Params], None], *, writes: bool = True) -> NoReturn:
     """Run the body of stage `name` and leave with the exit code that its end deserves.
 
     Args:
         name: As `dvc.yaml` has it.
         work: Admits, measures, and writes the outputs.
+        writes: Whether this is a run of the stage; what only looks leaves no record of one.
     """
     started = time.perf_counter()
     usual_s = _taken(name)
-    with contextlib.suppress(OSError):
-        (TIMES / f"{name}.json").unlink(missing_ok=True)
+    if writes:
+        with contextlib.suppress(OSError):
+            (TIMES / f"{name}.json").unlink(missing_ok=True)
     os.environ[STAGE] = f"[beside] {name}"
     code = 0
     try:
@@ -44,5 +46,6 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
             file=sys.stderr,
         )
         code = 1
-    _record(name, started, code)
+    if writes:
+        _record(name, started, code)
     sys.exit(code)

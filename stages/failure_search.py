@@ -11,7 +11,7 @@ from pathlib import Path
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.contenders import admitted_contenders
-from genpolicy.errors import RefusedError
+from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.documents.failures import FAILURE
 from genpolicy.evidence.failure_search.conditions import searched_conditions
 from genpolicy.evidence.failure_search.rollouts import Searching
@@ -42,6 +42,7 @@ from stages._stage import ARTIFACTS, Params
 def work(params: Params) -> None:
     """Admit through gate D, then search every condition for failures of whoever passed it."""
     admitted = admit("failure_search", Path.cwd()).candidates
+    require_one_contract("train_generators", dataset=False)
     looks = search_settings(params.raw).evaluations > 0
     with output_folder(ARTIFACTS / "failure_search") as folder:
         write_searches(
@@ -55,7 +56,6 @@ def work(params: Params) -> None:
 def planned(params: Params, candidates: Sequence[str], *, journals: Path) -> list[Searching]:
     """Every search of these candidates, under what the comparison ran under."""
     evaluations = search_settings(params.raw).evaluations
-    require_one_contract("train_generators", dataset=False)
     section = params.section("stress", StressSettings)
     seed = params.section("policy", PolicySettings).seeds[0]
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
@@ -91,14 +91,24 @@ def again(params: Params, path: Path) -> None:
         BadInputError: No file of a failure, or of another search than lies here.
     """
     failure = FAILURE.parse(read_json(path), where=str(path))
+    require_one_contract("train_generators", dataset=False)
     searches = planned(params, [failure.method], journals=Path())
-    now = run_again(search_of(searches, failure), failure)
-    if now != failure:
+    try:
+        now = run_again(search_of(searches, failure), failure)
+    except ValueError as error:  # a size that the condition does not take
+        raise BadInputError(
+            where=str(path),
+            found=f"{type(error).__name__}: {str(error).splitlines()[0]}",
+            expected="a failure as the search wrote it",
+            action="Take the file from artifacts/failure_search/failures.",
+        ) from error
+    then, found = FAILURE.plain(failure), FAILURE.plain(now)
+    if other := next((name for name in then if then[name] != found[name]), ""):
         raise RefusedError(
             gate="E",
-            criterion=f"{path.name}: events_sha256",
-            measured=f"{now.events_sha256} ({now.outcome})",
-            limit=f"{failure.events_sha256} ({failure.outcome}), as found",
+            criterion=f"{path.name}: {other}",
+            measured=f"{found[other]} ({now.outcome})",
+            limit=f"{then[other]} ({failure.outcome}), as found",
             report="artifacts/failure_search/searched.parquet",
             action="Is code, a library or the processor another one?",
         )
@@ -107,5 +117,5 @@ def again(params: Params, path: Path) -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        main("failure_search", lambda params: again(params, Path(sys.argv[1])))
+        main("failure_search", lambda params: again(params, Path(sys.argv[1])), writes=False)
     main("failure_search", work)

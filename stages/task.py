@@ -16,6 +16,7 @@ from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.hosts.loadable import require_loadable
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
+from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
@@ -36,6 +37,7 @@ def work(params: Params) -> None:
     refuse_foreign_files()
     require_own_files(Path.cwd())
     require_possible(params.raw.get("comparison"))
+    search_settings(params.raw)  # read by a stage behind the last gate; wrong, it is told here
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     if brought:

@@ -26,7 +26,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 MADE = (
     "task", "record", "ingest", "train_baselines", "train_factors", "candidates",
-    "train_generators", "monitors", "card",
+    "train_generators", "monitors", "failure_search", "card",
 )  # fmt: skip
 """Stages that make what is measured, only report, or make the card: no figure of theirs is held
 against a limit."""

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from gates.proof import judge
+from genpolicy.errors import GenpolicyError
 
 HOME, ADDRESS = ".prefect", "PREFECT_API_URL"
 RESUME = ("resume", "--if-waiting", "--workspace")
@@ -26,7 +27,13 @@ def go_on(root: Path) -> None:
 
     Says so, and fails never: the signature stands.
     """
-    if not may_wait(root) or judge(root, "E").verdict != "PASS":
+    if not may_wait(root):
+        return
+    try:
+        if judge(root, "E").verdict != "PASS":
+            return
+    except GenpolicyError as error:
+        print(f"The signature stands. Gate E cannot be judged yet: {error}")
         return
     print("The card is complete. Looking for a run of gate E that waits for it ...", flush=True)
     command = [sys.executable, "-m", "genpolicy", *RESUME, str(root)]

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.rows.failures import SearchedRow
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
@@ -82,8 +83,18 @@ def searched_caveats(root: Path, candidate: str) -> tuple[str, ...]:
     return (
         f"Failures {COUNTED}: {candidate} failed in {failed} of {evaluated} rollouts that a search "
         f"asked for ({listed(own)}; {SEARCHED}, SHA-256 {digest}...). They were looked for, so "
-        "their share is no rate of failure; where none was found, so many rollouts found none.",
+        "their share is no rate of failure; where none was found, so many rollouts found none."
+        f"{_violations(root)}",
     )
+
+
+def _violations(root: Path) -> str:
+    """What the independent checker found in the searched rollouts; empty where it found nothing."""
+    folder = root / FAILURE_SEARCH
+    if not (folder / CHECKER.file).is_file():
+        return ""
+    found = len(CHECKER.read(folder).violations)
+    return f" The independent checker found {found} violations in them." if found else ""
 
 
 def listed(found: Iterable[Found]) -> str:
@@ -98,8 +109,8 @@ def _mildest(found: Found) -> str:
     if row is None:
         return ""
     size = size_of(found)
-    at = f"from {size} on, " if size else ""
-    return f", {at}{row.outcome} at {row.perturbation}/{row.start}"
+    at = f" at {size}" if size else ""
+    return f", mildest{at}: {row.outcome} at {row.perturbation}/{row.start}"
 
 
 def size_of(found: Found) -> str:

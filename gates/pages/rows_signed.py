@@ -59,7 +59,7 @@ def _lines(root: Path, papers: Papers) -> list[tuple[str, ...]]:
         if not own and papers.present and papers.refusal:
             found.append((role, "", "", "", "", "", REFUSED, papers.refusal))
         elif not own:
-            found.append((role, "", "", digest, *days, WAITS, _who(root, role)))
+            found.append((role, "", "", digest, *days, WAITS, _who(root, role, papers)))
     others = (person for person in signers if person.role not in needed)
     return found + [
         (one.role, one.id, fingerprint(one), digest, *days, UNDECIDED, "") for one in others
@@ -71,8 +71,10 @@ def fingerprint(person: Person) -> str:
     return person.key.keyid[:KEY_DIGITS]
 
 
-def _who(root: Path, role: str) -> str:
-    """Who of the list may sign in a role."""
+def _who(root: Path, role: str, papers: Papers) -> str:
+    """Who of the list may sign in a role; of reviewers the one whom a signed card names."""
+    if role == REVIEWER and papers.signed:
+        return f"for {papers.signed.card.reviewer}, whom the card names"
     try:
         people = load_allow_list(root).people
     except GenpolicyError:

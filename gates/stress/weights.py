@@ -37,10 +37,13 @@ def require_weights(weights: Weights) -> Weights:
         weights: By owner and cost.
 
     Raises:
-        ValueError: An unknown cost or one that cannot be weighed, one under two owners, a weight
-            that is not above 0, no reason, or more in sum than a success may lose.
+        ValueError: An owner without a cost, an unknown cost or one that cannot be weighed, one
+            under two owners, a weight that is not above 0, no reason, or more in sum than a success
+            may lose.
     """
     names = [name for costs in weights.values() for name in costs]
+    if bare := [owner for owner, costs in weights.items() if not costs]:
+        raise ValueError(f"the {bare[0]} owner weighs no cost; leave the owner out")
     for name in names:
         if name not in COSTS:
             why = NOT_WEIGHED.get(name, f"there are {', '.join(COSTS)}")

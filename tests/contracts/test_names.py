@@ -5,10 +5,10 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 import yaml
+from _beside import BESIDE
 
 from flows.ladder import GATES, stages_by_gate
 from flows.workspace import declared_outputs, merged
-from stages._beside import BESIDE
 
 ROOT = Path(__file__).parents[2]
 OWNERS = {"model", "perception", "controller", "safety"}

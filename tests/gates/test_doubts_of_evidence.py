@@ -6,11 +6,13 @@ from test_differences import REPORT
 from test_verdicts import criterion
 
 from gates.card.card import caveats_of
+from gates.claim import MEDIAN_PASSES, SHOWN
 from gates.doubt import Doubt
 from gates.doubts import doubts_of, for_a_card
 from gates.doubts_of_evidence import FEW, ONE_MODE
 from gates.proof import judge
 from gates.stress.contact import UNTOUCHED
+from gates.words import percent, share_of
 
 
 def answer(verdict="PASS", candidate="flow", name="x", **changes):
@@ -189,13 +191,22 @@ def test_the_ladder_of_one_seed_says_so_at_each_gate_that_has_trained_policies(l
         assert len(found.criteria) == 1
 
 
+def median_of(passed, of):
+    return f"share 1; the {MEDIAN_PASSES} {share_of(passed, of)} ({SHOWN})"
+
+
+def one_mode_of(share):
+    return f"of 9; bound; one_mode_bc in {percent(share)} ({SHOWN}: with one valid mode it stays"
+
+
 @pytest.mark.parametrize(("caveat", "passes"), [
-    ("share 1; the median of the neighbours passes in 349 of 360 (shown, not judged)", True),
-    ("share 1; the median of the neighbours passes in 96.9 %, 349 of 360 situations (shown", True),
-    ("share 1; the median of the neighbours passes in 179 of 360 (shown, not judged)", False),
-    ("0.4 of 9; bound; one_mode_bc 0.987 (shown, not judged: with one valid mode it", True),
-    ("0.4 of 9; bound; one_mode_bc in 98.7 % (shown, not judged: with one valid mode it", True),
-    ("0.4 of 9; bound; one_mode_bc 0.487 (shown, not judged: with one valid mode it", False),
+    (median_of(349, 360), True),
+    (median_of(1080, 1080), True),
+    (median_of(179, 360), False),
+    (median_of(0, 360), False),
+    (median_of(0, 0), False),
+    (one_mode_of(0.987), True),
+    (one_mode_of(0.487), False),
     ("0.4 of 9; bound", False),
 ])  # fmt: skip
 @pytest.mark.parametrize("verdict", ["PASS", "INCONCLUSIVE"])
@@ -203,8 +214,8 @@ def test_a_simpler_rule_that_is_only_shown_is_a_doubt_where_it_passes(caveat, pa
     found = said("a simpler rule passes", answer(verdict, None, caveat=caveat, interval=(0.0, 1.0)))
     assert len(found) == passes
     for doubt in found:
-        how = "passes in 349 of 360" if "median" in caveat else "one_mode_bc acts validly in 98.7 %"
-        assert (how in doubt.text or "349 of 360" in doubt.text) and "not judged" in doubt.text
+        assert any(told in doubt.text for told in ("349 of 360", "1,080 of 1,080", "98.7 %"))
+        assert SHOWN in doubt.text
 
 
 def test_gate_a_writes_what_the_rule_of_simpler_rules_reads(ladder):

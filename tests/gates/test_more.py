@@ -65,3 +65,8 @@ def test_what_lies_on_the_limit_is_not_promised_to_decide():
 )
 def test_without_what_was_seen_and_both_ends_no_number_is_made_up(measured):
     assert astride(measured, 0.55, "<=") == ASTRIDE and ASTRIDE.startswith(INSIDE)
+
+
+def test_an_end_on_the_limit_itself_asks_for_a_few_more():
+    said = enough(0.2, (0.1, 0.3), 0.1, "<=", counted="9 starts")
+    assert said.startswith("about 1.1 times as many (9 starts now) show that it is broken")

@@ -121,3 +121,29 @@ def test_another_finding_of_the_checker_is_refused(root, params):
     (folder / CHECKER.file).unlink()
     CHECKER.write(folder, replace(stated, checked_actions=1))
     refused(root, params, "checked_actions")
+
+
+def test_a_rollout_of_another_start_under_the_name_of_this_one_is_refused(
+    root, params, monkeypatch
+):
+    """Its row, its point and its file fit each other; the journal began elsewhere."""
+    derived = module.derived_with_recoveries
+
+    def elsewhere(*args, **options):
+        rows, recoveries = derived(*args, **options)
+        return {key: {**row, "start_sha256": "0" * 64} for key, row in rows.items()}, recoveries
+
+    monkeypatch.setattr(module, "derived_with_recoveries", elsewhere)
+    monkeypatch.setattr(module, "compare_rows", lambda *args, **options: None)
+    refused(root, params, "start of the journal")
+
+
+def test_of_a_search_of_nothing_nothing_is_asked_of_the_starts_of_the_task(
+    root, params, monkeypatch
+):
+    """Budget 0 is what a task is told to set whose starts cannot be chosen."""
+    write_rows(root / SEARCHED, SearchedRow, [])
+    none = {**params, "card": {"failure_search": {"evaluations": 0}}}
+    odd = SimpleNamespace(name="odd", sample_start=lambda rng: rng.normal())
+    monkeypatch.setattr(module, "load_task", lambda name: odd)
+    assert module._asked_again(root, none, [], []) == []

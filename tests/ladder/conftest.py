@@ -10,9 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from _beside import BESIDE
 from ladder_workspace import ALWAYS_RUN, copy_of, make_small_ladder, repro
 
-from stages._beside import BESIDE
 from stages._stage import STAGES
 
 

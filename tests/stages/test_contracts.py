@@ -11,6 +11,7 @@ from genpolicy.errors import ContractError
 from genpolicy.integrity.hashing import sha256_file
 from stages import (
     audit,
+    failure_search,
     latency,
     measure_baselines,
     measure_factors,
@@ -26,19 +27,19 @@ from stages import (
 from stages._contracts import require_contract_of_task, require_one_contract
 
 STAGES = (
-    audit, latency, measure_baselines, measure_factors, monitors, reload, shadow, stress,
-    train_baselines, train_factors, train_generators, wall_clock,
+    audit, failure_search, latency, measure_baselines, measure_factors, monitors, reload, shadow,
+    stress, train_baselines, train_factors, train_generators, wall_clock,
 )  # fmt: skip
 TRAINED = {
-    latency: ("train_baselines", "train_generators"), measure_baselines: ("train_baselines",),
-    measure_factors: ("train_factors",), monitors: ("train_generators",),
-    reload: ("train_generators",), shadow: ("train_generators",),
+    failure_search: ("train_generators",), latency: ("train_baselines", "train_generators"),
+    measure_baselines: ("train_baselines",), measure_factors: ("train_factors",),
+    monitors: ("train_generators",), reload: ("train_generators",), shadow: ("train_generators",),
     stress: ("train_baselines", "train_generators"), train_generators: ("train_baselines",),
     wall_clock: ("train_generators",),
 }  # fmt: skip
 """Whose checkpoints each of them reads."""
-READING = [stage for stage in STAGES if stage is not stress]
-"""Who reads the dataset: the comparison rolls out, and asks for the checkpoints only."""
+READING = [stage for stage in STAGES if stage not in (stress, failure_search)]
+"""Who reads the dataset: who only rolls out asks for the checkpoints."""
 TASK = {"observation_sha256": "o", "action_sha256": "a", "name": "t", "phases": {"all": ["p"]}}
 MANIFEST = {
     "observation_contract": {"sha256": "o"}, "action_contract": {"sha256": "a"}, "phases": ["p"],

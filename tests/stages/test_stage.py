@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 import yaml
+from _beside import BESIDE
 
 from genpolicy.errors import ContractError, RefusedError
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.progress import STAGE
-from stages._beside import BESIDE
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {

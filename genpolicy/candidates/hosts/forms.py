@@ -34,8 +34,9 @@ def require_forms(entry: Entry, folder: Path) -> None:
 def _require_function(path: Path, name: str) -> None:
     """By the names that the module binds: to import it would run it."""
     try:
-        table = symtable.symtable(path.read_bytes().decode(), str(path), "exec")
-    except (SyntaxError, ValueError) as error:
+        # Bytes: a module may say its encoding itself. The stub knows texts only.
+        table = symtable.symtable(path.read_bytes(), str(path), "exec")  # type: ignore[arg-type]
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ConfigError(
             where=str(path),
             found=f"no Python module ({error})",

@@ -12,25 +12,28 @@ MAXIMUM_TEXT = 200
 # Larger objects are models and states of a simulator.
 MAXIMUM_OBJECT = 1 << 20
 # An object in an object in an object is a description of a scene.
-MAXIMUM_DEPTH, MAXIMUM_LEAVES = 3, 64
+MAXIMUM_DEPTH, MAXIMUM_LEAVES = 3, 256
 
 
 def leaves(name: str, text: str) -> dict[str, str]:
-    """A text under its name; a JSON object as its scalar parts, `name.key`.
+    """A text under its name; a JSON object as its parts, `name.key`.
+
+    The text of an object is not kept beside its parts: some of them are no reason, an outcome for
+    one, and would come back with it.
 
     Args:
         name: What the text is called.
         text: What was written.
 
     Returns:
-        Texts of at most 200 letters by name; of an object at most 64, in the order of their names,
-        and none of lists, of what is empty and of what is longer.
+        The first 200 letters of texts by name; of an object at most 256 parts, in the order of
+        their names, a list and what is deeper as its JSON, and nothing of what is empty.
     """
     found = _object(text)
     if found is None:
         return {name: text[:MAXIMUM_TEXT]}
-    short = {key: value for key, value in _scalars(name, found, 1) if len(value) <= MAXIMUM_TEXT}
-    return {key: short[key] for key in sorted(short)[:MAXIMUM_LEAVES]}
+    parts = dict(_parts(name, found, 1))
+    return {key: parts[key][:MAXIMUM_TEXT] for key in sorted(parts)[:MAXIMUM_LEAVES]}
 
 
 def _object(text: str) -> dict[str, object] | None:
@@ -44,10 +47,10 @@ def _object(text: str) -> dict[str, object] | None:
     return found if isinstance(found, dict) else None
 
 
-def _scalars(name: str, found: dict[str, object], depth: int) -> Iterator[tuple[str, str]]:
+def _parts(name: str, found: dict[str, object], depth: int) -> Iterator[tuple[str, str]]:
     for key, value in found.items():
-        if isinstance(value, dict):
-            if depth < MAXIMUM_DEPTH:
-                yield from _scalars(f"{name}.{key}", value, depth + 1)
-        elif isinstance(value, str | bool | int | float):
-            yield f"{name}.{key}", str(value)
+        if isinstance(value, dict) and depth < MAXIMUM_DEPTH:
+            yield from _parts(f"{name}.{key}", value, depth + 1)
+        elif value is not None:
+            plain = isinstance(value, str | bool | int | float)
+            yield f"{name}.{key}", str(value) if plain else json.dumps(value)

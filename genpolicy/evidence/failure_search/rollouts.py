@@ -144,8 +144,11 @@ def search_with(
 ) -> None:
     """Ask for every rollout of a search, generation by generation; `evaluate` says its worth.
 
-    Who tells the same worths again is asked for the same rollouts again.
+    Who tells the same worths again is asked for the same rollouts again. Of none nothing is asked,
+    nor whether the starts of the task can be chosen.
     """
+    if evaluations == 0:
+        return
     counted = 0
 
     def of_points(points: Sequence[Array]) -> Sequence[float]:

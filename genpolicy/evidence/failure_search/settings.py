@@ -35,10 +35,10 @@ class SearchSettings(Settings):
 
 
 def search_settings(raw: Mapping[str, Any]) -> SearchSettings:
-    """From the whole of `params.yaml`.
+    """From the whole of `params.yaml`; of a section that is not there its defaults.
 
     Raises:
-        ConfigError: No section, an unknown key, no whole number, or out of its range.
+        ConfigError: No section but a value, an unknown key, no whole number, or out of its range.
     """
     section = raw.get(HOME)
     given = section.get(KEY, {}) if isinstance(section, dict) else {}

@@ -5,10 +5,11 @@ chosen numbers in the place of drawn ones, it makes exactly the starts that it c
 and nobody outside of it has to know a range.
 """
 
+import math
 from typing import Any, NoReturn, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.errors import ConfigError
 from genpolicy.tasks.api import Start, Task
@@ -35,28 +36,38 @@ class Chosen:
         self._task = task
         self._unit = np.asarray(unit, dtype=np.float64)
 
-    def random(self, size: int | tuple[int, ...] | None = None) -> Any:
+    def random(self, size: int | tuple[int, ...] | None = None, **other: object) -> Any:
         """The next numbers as they are."""
+        if other:
+            self.refuse(f"drawing a start with {', '.join(other)}")
         return self.uniform(size=size)
 
     def uniform(
-        self, low: float = 0.0, high: float = 1.0, size: int | tuple[int, ...] | None = None
+        self,
+        low: ArrayLike = 0.0,
+        high: ArrayLike = 1.0,
+        size: int | tuple[int, ...] | None = None,
     ) -> Any:
-        """The next numbers, between `low` and `high`."""
-        count = 1 if size is None else int(np.prod(size))
+        """The next numbers, between `low` and `high`, which may be arrays, as numpy takes them."""
+        least, most = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        shape = np.broadcast_shapes(least.shape, most.shape)
+        if size is not None:
+            shape = np.broadcast_shapes(shape, size)
+        count = math.prod(shape)
         following = self._unit[self.drawn : self.drawn + count]
         if len(following) < count:
-            self._refuse(f"drawing more than {len(self._unit)} numbers for a start")
+            self.refuse(f"drawing more than {len(self._unit)} numbers for a start")
         self.drawn += count
-        values = low + (high - low) * following
-        return float(values[0]) if size is None else values.reshape(size)
+        values = least + (most - least) * following.reshape(shape)
+        return values if shape else float(values)
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("__"):
             raise AttributeError(name)
-        self._refuse(f"drawing a start by `{name}`")
+        self.refuse(f"drawing a start by `{name}`")
 
-    def _refuse(self, found: str) -> NoReturn:
+    def refuse(self, found: str) -> NoReturn:
+        """Starts that cannot be chosen."""
         raise ConfigError(
             where=f"task {self._task}: sample_start",
             found=found,
@@ -73,6 +84,8 @@ def coordinates_of(task: Task) -> int:
     """
     middle = Chosen(task.name, np.full(MOST_COORDINATES, 0.5))
     task.sample_start(cast(np.random.Generator, middle))
+    if middle.drawn == 0:
+        middle.refuse("a start of which no number is drawn")
     return middle.drawn
 
 

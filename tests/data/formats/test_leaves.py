@@ -14,7 +14,15 @@ def test_an_object_is_its_scalar_parts():
     })  # fmt: skip
     assert leaves("ep_meta", text) == {
         "ep_meta.lang": "open it", "ep_meta.layout_id": "3", "ep_meta.done": "True",
+        "ep_meta.objects": '[{"name": "a"}]',
         "ep_meta.scene.style": "1.5", "ep_meta.scene.deep.er": "x",
+        "ep_meta.scene.deep.and": '{"deeper": 1}', "ep_meta.long": "x" * MAXIMUM_TEXT,
+    }  # fmt: skip
+
+
+def test_a_list_is_a_part_and_the_text_is_not_told_beside_its_parts():
+    assert leaves("goal", '{"side": [1, 0], "of": {"n": 2}}') == {
+        "goal.side": "[1, 0]", "goal.of.n": "2",
     }  # fmt: skip
 
 
@@ -29,5 +37,6 @@ def test_nesting_that_no_reader_follows_is_text():
 
 
 def test_many_parts_are_cut_by_name():
-    text = json.dumps({f"k{k:03d}": k for k in reversed(range(200))})
-    assert list(leaves("a", text)) == [f"a.k{k:03d}" for k in range(MAXIMUM_LEAVES)]
+    text = json.dumps({f"k{k:03d}": k for k in reversed(range(300))})
+    names = [f"a.k{k:03d}" for k in range(MAXIMUM_LEAVES)]
+    assert list(leaves("a", text)) == names

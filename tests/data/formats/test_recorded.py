@@ -213,7 +213,7 @@ def test_one_object_that_says_all_is_kept_part_by_part(layouts, tmp_path, stored
                     demo.create_dataset("ep_meta", data=spoken(i))
     _, kept = values_of(path, tmp_path)
     # Of the episode's outcome nothing is a reason, whoever says it.
-    assert set(kept) == {"ep_meta.lang", "ep_meta.seed"}
+    assert set(kept) == {"ep_meta.lang", "ep_meta.scene.objects", "ep_meta.seed"}
     said = {runs.values[0] for runs in kept["ep_meta.lang"].values()}
     assert said == {"go left", "go right"}
 

@@ -53,10 +53,23 @@ def test_a_task_that_draws_many_at_once_is_chosen_alike(foreign_task):
     ("draw", "said"),
     [
         (lambda rng: rng.normal(), "drawing a start by `normal`"),
-        (lambda rng: rng.uniform(size=65), "more than 64 numbers"),
+        (lambda rng: rng.uniform(size=65), "drawing more than 64 numbers"),
+        (lambda rng: rng.uniform(np.zeros(65), 1.0), "drawing more than 64 numbers"),
+        (lambda rng: rng.random(4, dtype=np.float32), "drawing a start with dtype"),
+        (lambda rng: 0.5, "a start of which no number is drawn"),
     ],
 )
 def test_a_task_that_draws_otherwise_is_refused_by_name(draw, said):
     task = SimpleNamespace(name="odd", sample_start=draw)
     with pytest.raises(ConfigError, match=rf"task odd: sample_start is {said}"):
         coordinates_of(task)
+
+
+@pytest.mark.parametrize("size", [None, 3, (2, 3)])
+def test_ends_that_are_arrays_are_taken_as_numpy_takes_them(size):
+    low, high = [0.0, 10.0, 20.0], np.array([1.0, 11.0, 22.0])
+    drawn = stream(5, "there").uniform(low, high, size)
+    unit = stream(5, "there").random(drawn.shape)
+    task = SimpleNamespace(name="odd", sample_start=lambda rng: rng.uniform(low, high, size))
+    assert coordinates_of(task) == drawn.size
+    np.testing.assert_allclose(chosen_start(task, unit.ravel()), drawn, atol=1e-12)

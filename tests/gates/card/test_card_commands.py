@@ -10,7 +10,9 @@ from gates import proof
 from gates.card.commands import card
 from gates.commands import gates, verify
 from gates.proof import Rung
+from gates.rederive import rederive
 from gates.report import read_report
+from gates.writing import write_gate
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import RefusedError
 
@@ -35,7 +37,7 @@ def run(team, capsys):
 def journals(monkeypatch):
     """Journals that say what the tables say; those of this evidence are no journals."""
     asked = []
-    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: asked.append(gate))
+    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate, **_: asked.append(gate))
     return asked
 
 
@@ -89,7 +91,7 @@ def test_evidence_without_journals_is_neither_signed_nor_verified(team, run, com
 def test_evidence_that_its_journals_do_not_say_is_refused(team, run, commit, monkeypatch, gate):
     """As after a forged table and a forged hash in the lock file: the chain itself holds."""
 
-    def differs(root, asked):
+    def differs(root, asked, **_):
         if asked == gate:
             raise RefusedError(
                 gate=gate, criterion="rollout", measured="1", limit="0", report="r", action="Stop."
@@ -182,3 +184,14 @@ def test_a_retired_name_says_what_to_type(group, typed, instead, capsys):
     assert run_program(group, "genpolicy", words) == 2
     said = capsys.readouterr()
     assert f"no command any more, expected genpolicy {instead}." in said.err and not said.out
+
+
+def test_signing_goes_on_behind_a_gate_that_was_judged_before(team, run, commit, monkeypatch):
+    """Gate E's page shows who has signed: the next signature makes it old, and is no forgery."""
+    monkeypatch.setattr("gates.rederive._evidence", lambda root, gate: None)
+    write_gate(team.root, "E")
+    for name in ("rita", "mo", "pia"):
+        code, said = _sign(team, run, name)
+        assert code == 0, said
+    with pytest.raises(RefusedError, match="gate_e"):
+        rederive(team.root, "E")

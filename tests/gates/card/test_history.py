@@ -82,6 +82,7 @@ def test_every_stage_that_measures_for_a_gate_is_dated():
     """A new stage is, until somebody says that it makes things and measures nothing."""
     assert set(MEASURED) | set(MADE) == {stage for stages in RUNGS.values() for stage in stages}
     assert {"audit", "reload", "latency", "shadow", "stress"} < set(MEASURED)
+    assert "failure_search" in MADE, "no figure of it is held against a limit"
     assert all(set(MEASURED) & set(RUNGS[gate]) for gate in "ABCD")
 
 

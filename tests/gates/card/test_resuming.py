@@ -8,6 +8,7 @@ import pytest
 
 from gates.card import resuming
 from gates.card.resuming import ADDRESS, HOME, go_on
+from genpolicy.errors import ConfigError
 
 
 @pytest.fixture
@@ -64,3 +65,13 @@ def test_whatever_comes_of_it_the_signature_stands(asked, workspace, code, capsy
     asked.code = code
     go_on(workspace)
     assert "The signature stands; try: genpolicy resume" in capsys.readouterr().out
+
+
+def test_a_gate_that_cannot_be_judged_costs_no_signature(asked, workspace, monkeypatch, capsys):
+    def judge(root, gate):
+        raise ConfigError(where="params.yaml: gate_e", found="x", expected="y", action="Z.")
+
+    monkeypatch.setattr(resuming, "judge", judge)
+    go_on(workspace)
+    said = capsys.readouterr().out
+    assert asked.ran == [] and "The signature stands" in said and "params.yaml: gate_e" in said

@@ -57,7 +57,7 @@ def test_the_card_says_how_often_one_looked_and_that_it_counts_nowhere(tmp_path)
     for part in (
         "found by search; counted in no promotion test",
         "flow failed in 2 of 4 rollouts",
-        "camera_delay 2 of 3, from magnitude_s 0.031 (stated up to 0.08) on, force_stop at "
+        "camera_delay 2 of 3, mildest at magnitude_s 0.031 (stated up to 0.08): force_stop at "
         "camera_delay@search/2",
         "nominal 0 of 1; artifacts/failure_search/searched.parquet, SHA-256 ",
         "no rate of failure",

@@ -76,3 +76,8 @@ def test_weights_are_part_of_the_plan_only_where_they_are_stated():
     for before, now in ((plain, weighed), (weighed, plain), (weighed, other)):
         found = moves(plan_of(before), now)
         assert [(move.place, move.kind) for move in found] == [("gate_d.utility", "changed")]
+
+
+def test_an_owner_who_weighs_nothing_is_left_out():
+    with pytest.raises(ValueError, match="the model owner weighs no cost"):
+        require_weights({"model": {}})
