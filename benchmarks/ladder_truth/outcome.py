@@ -22,7 +22,7 @@ GATE_OF_STAGE = {
     **dict.fromkeys(("candidates", "train_generators", "reload", "latency", "gate_b"), "B"),
     **dict.fromkeys(("shadow", "gate_c"), "C"),
     **dict.fromkeys(("wall_clock", "stress", "monitors", "gate_d"), "D"),
-    **dict.fromkeys(("card", "gate_e"), "E"),
+    **dict.fromkeys(("failure_search", "card", "gate_e"), "E"),
 }  # fmt: skip
 LAST = {"small": "E", "brought": "A", "signed": "E"}
 """The last gate of each base; what stands above it is not looked at."""
