@@ -5,11 +5,16 @@ from pathlib import Path
 from gates.pages.page import gate_page
 from gates.pages.rows import printed_rows, rows_folder, rows_of
 from gates.pages.summary import markdown
-from gates.report import GateReport, report_path
+from gates.report import GateReport, parse_report, report_bytes, report_path
 
 
 def printed_beside(root: Path, report: GateReport) -> dict[str, bytes]:
-    """Bytes of every printed file by its path from the root, the page and the summary first."""
+    """Bytes of every printed file by its path from the root, the page and the summary first.
+
+    Printed is what a reader of the JSON has: a page shows settings in the order of their keys, and
+    who judged may hold them in another one.
+    """
+    report = parse_report(report_bytes(report), gate=report.gate)
     base = Path(report_path(report.gate))
     rows, folder = printed_rows(rows_of(root, report), report), rows_folder(report.gate)
     return {

@@ -40,6 +40,21 @@ def test_all_of_it_lies_there_and_nothing_else(printed):
     assert differing(root, report) == changed_page(root) == ""
 
 
+def _turned(value):
+    """The same with the keys of every map in the other order."""
+    if not isinstance(value, dict):
+        return value
+    return {key: _turned(value[key]) for key in reversed(value)}
+
+
+def test_the_order_in_which_somebody_wrote_settings_moves_no_page(printed):
+    """Of a report that was judged just now it is theirs, of one that was read the alphabet's."""
+    root, report = printed
+    turned = report.model_copy(update={"settings": _turned(report.settings)})
+    assert list(turned.settings) != list(report.settings)
+    assert printed_beside(root, turned) == printed_beside(root, report)
+
+
 def test_a_folder_of_an_earlier_run_leaves_nothing_behind(again):
     root, _ = again
     (root / "reports/gate_d/old.csv").write_text("row\n")
