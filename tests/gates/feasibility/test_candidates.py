@@ -166,7 +166,7 @@ def test_one_odd_chunk_does_not_keep_the_gate_open(ladder):
     evidence.edit_table(ladder, CANDIDATES, _takes_another_way("over", [number]))
     report, found = _gap(ladder)
     assert found.verdict == report.verdict == "PASS"
-    assert found.caveat.endswith("; left out: over in 1 episodes, together at most 0.0894 of all")
+    assert found.caveat.endswith("; left out: over in 1 episodes, together at most 8.94 % of all")
     assert "over" not in found.caveat.partition(";")[0], "it is compared with nothing"
 
 
