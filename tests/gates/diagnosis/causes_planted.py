@@ -170,7 +170,7 @@ CAUSES = (
     ("simulation-only", "first", table("wall_clock/invocations.parquet", wall_clock_misses), "D",
      "the wall clock differs from the virtual one: "),
     ("simulation-only", "first", table("latency/latency.parquet", without_exposure), "B",
-     "latency_terms_missing: 1, required <= 0. Missing: exposure"),
+     "latency_terms_missing: 1, required <= 0. missing: exposure"),
     ("simulation-only", "then",
      document("shadow/mutants.json", unnoticed("execution", "controller_mode")), "C",
      "execution.controller_mode can be left out and nobody notices"),

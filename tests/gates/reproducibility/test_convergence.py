@@ -94,7 +94,7 @@ def test_a_gain_over_a_baseline_that_still_learns_is_none(ladder):
     report = judge(ladder, "B")
     assert red(report) == {"baseline_fall_upper"}
     caveat = found_in(report, "baseline_fall_upper")[0].caveat
-    assert all(name in caveat for name in ("chunked_bc 0.04", "; bc 0.04", "; act 0.2"))
+    assert all(name in caveat for name in ("chunked_bc 4 %", "; bc 4 %", "; act 20 %"))
 
 
 def test_the_worse_end_over_episodes_decides(ladder):
@@ -188,4 +188,4 @@ def test_two_episodes_are_enough_to_measure_and_one_is_not(ladder):
 
 def test_a_loss_that_rises_is_no_fall(ladder):
     found = _of_act(ladder, [(-0.2, 20)])
-    assert "act -0.2" in found.caveat and found.verdict == "PASS"
+    assert "act -20 %" in found.caveat and found.verdict == "PASS"

@@ -38,7 +38,7 @@ def test_the_slower_measurement_is_held_against_the_faster_whichever_it_is(
     evidence.edit_table(ladder, LATENCY, change)
     for found in found_in(judge(ladder, "B"), RATIOS[temperature]):
         assert found.measured == pytest.approx(4.0)
-        assert "at 4" in found.caveat and found.verdict == "FAIL"
+        assert "×4" in found.caveat and found.verdict == "FAIL"
 
 
 def test_cold_is_the_first_call_of_a_process_and_no_later_one(ladder):
