@@ -93,4 +93,4 @@ def test_the_seed_of_the_lowest_bound_is_told_with_its_own_numbers(ladder):
     found = found_in(judge(ladder, "B"), "mode_coverage_lower")[0]
     assert found.interval == pytest.approx(clopper_pearson(20, 30, 0.95))
     assert found.caveat.startswith("in 66.7 % (20 of 30 two-mode situations)")
-    assert "reaches every mode in 1;" in found.caveat
+    assert "reaches every mode in 100 %" in found.caveat

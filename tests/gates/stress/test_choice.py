@@ -122,7 +122,7 @@ def test_a_pair_is_told_apart_from_the_evidence_that_is_needed_on(
     assert found.promoted == promoted
     assert found.text.startswith(decision)
     said = "(evidence at most 20 to 1 that diffusion is better than flow, where 20 to 1 is needed; "
-    assert ("difference 10 points)" in found.text) == (promoted == "flow")
+    assert ("difference +10 points of success)" in found.text) == (promoted == "flow")
     assert promoted != "flow" or said in found.text
 
 

@@ -189,7 +189,7 @@ def test_where_phases_differ_the_oldest_action_of_any_of_them_counts(ladder):
     evidence.write_params(ladder, lambda p: p["execution"].update(maximum_age_s=ages))
     cold = lambda f: of(f) & (f["invocation"] == 0)  # noqa: E731
     evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.51, where=cold))
-    assert "beyond the maximum action age of 0.5 s" in flow(ladder, cost.latency_p95_s).caveat
+    assert "beyond the maximum action age of 500 ms" in flow(ladder, cost.latency_p95_s).caveat
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,9 @@ def test_the_point_that_is_said_is_the_share_of_the_pool(ladder):
     """Two misses of twenty on half of the starts: one of twenty in all."""
     half = lambda f: of(f) & (f["start"] % 2 == 0)  # noqa: E731
     evidence.edit_table(ladder, ROLLOUTS, cells("deadline_misses", 2, where=half))
-    assert ": 0.05, bounded by" in flow(ladder, cost.deadline_miss_upper).caveat
+    assert (
+        ": 5 % (80 of 1,600 invocations), at most" in flow(ladder, cost.deadline_miss_upper).caveat
+    )
 
 
 @pytest.mark.parametrize(
