@@ -75,6 +75,8 @@ def changed_page(root: Path) -> str:
         run = stages_of(root, LOCK).get(stage_of(gate)) or {}
         recorded = frozenset(str(entry.get("path")) for entry in run.get("outs") or ())
         report, _ = read_report(root, gate)
+        if not all((root / report_path(below)).is_file() for below in report.upstream):
+            continue  # its page shows what those below say; that one lacks is told by the proof
         if name := differing(root, report, recorded=recorded, whole=False):
             return name
     return ""

@@ -10,6 +10,8 @@ import pytest
 import yaml
 
 from gates.commands import gates
+from gates.pages.summary import markdown
+from gates.report import read_report, report_path
 from gates.run_commands import report
 from genpolicy.cli.shell import run_program
 
@@ -91,6 +93,9 @@ def test_a_workflow_shows_the_markdown_of_every_gate_that_was_judged(ladder, nam
     else:
         said = "\n".join(workflow["gates"]["after_script"])  # runs whatever the script did
     (pattern,) = re.findall(r"^\s*cat (\S+)", said, re.MULTILINE)
+    for gate in "ABCD":
+        page = (ladder / report_path(gate)).with_suffix(".md")
+        page.write_text(markdown(read_report(ladder, gate)[0]))
     shown = {path.name for path in ladder.glob(pattern)}
     assert shown == {f"gate_{gate}.md" for gate in "abcd"}
     assert all((ladder / f"reports/{file}").read_text().startswith("# Gate ") for file in shown)

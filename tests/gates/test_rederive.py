@@ -493,7 +493,8 @@ def test_an_invocation_that_does_not_say_from_what_it_drew_is_refused(root, monk
         rederive(root, "D")
 
 
-def test_declared_times_and_planned_perturbations_are_held_too(root):
+def test_declared_times_and_planned_perturbations_are_held_too(root, monkeypatch):
+    monkeypatch.setattr("genpolicy.evidence.stress.settings.OF_THEIR_NAME", ())
     for section, key, value in (
         ("latency", "declared", DECLARED | {"network": [0.002, 0.002]}),
         ("stress", "perturbations", PARAMS["stress"]["perturbations"]
