@@ -88,7 +88,7 @@ def test_every_text_of_a_folder_where_nothing_was_judged_is_on_its_page(tmp_path
 def test_doubts_come_before_what_holds_and_parts_in_the_order_of_their_numbers(copied):
     write_gate(copied, "E")
     text = page.index_page(copied)
-    heads = [html.unescape(head) for head in re.findall(r"<h2>(.*?)</h2>", text)]
+    heads = [html.unescape(head) for head in re.findall(r"<h2[^>]*>(.*?)</h2>", text)]
     assert heads == [f"{n} · {said}" for n, said in enumerate(SECTIONS, 1)]
     places = [text.index(sign) for sign in (
         '<div class="asked">', '<div class="boxes">', '<ol class="doubts">', 'class="bars"',

@@ -19,11 +19,18 @@ SCREEN, PAPER = STYLE.split("@media print{")
 PLOT = re.compile(r'<div class="plot" style="--least:(\d+)px"([^>]*)>(<svg.*?</svg>)</div>', re.S)
 LEFT_OUT = {
     "nav": "the links between pages",
-    "table.criteria .evidence": "the files behind each criterion",
-    ".on-screen": "how to read the page",
+    "table.criteria .evidence": "the files and rows behind each criterion",
     "table.duties tr.PASS": "of each part below what holds",
 }
 """What the paper does not show, and how the page says so."""
+ON_SCREEN = {
+    r'<(?:h2|ol) class="(?:reading )?on-screen">(?:Read|<li>)': "how to read the page",
+    r'<small class="on-screen">|<p class="lead on-screen">': "the files and rows behind each",
+    r'<(?:h2|pre) class="on-screen">(?:Reproduce|dvc)': "the commands that derive it again",
+    r'<(?:h2|details) class="on-screen">(?:9 |<summary>)|<dl class="words on-screen">':
+        "part 9 (commands, hashes, settings, words)",
+}  # fmt: skip
+"""The same of what is marked so: how each such element begins."""
 CONTROLS = {".clip fieldset", ".moments input", ".skip", "td.measured summary"}
 """What there is nothing to do with on paper."""
 
@@ -82,17 +89,21 @@ def test_paper_leaves_out_what_the_page_names_and_nothing_else(pages):
         if "display:none" in body
         for head in heads.split(",")
     }
-    assert hidden == set(LEFT_OUT) | CONTROLS
+    assert hidden == {*LEFT_OUT, *CONTROLS, ".on-screen"}
+    assert ".on-screen{display:none!important}" in PAPER and "small:not(.on-screen)" in PAPER
     for name, text in pages.items():
         (note,) = re.findall(r'<p class="on-paper">(.*?)</p>', text)
         used = {
             "nav": "<nav" in text,
             "table.criteria .evidence": 'class="evidence"' in text,
-            ".on-screen": "on-screen" in text.split("</style>")[1],
             "table.duties tr.PASS": '<table class="duties"' in text,
         }
         for what, said in LEFT_OUT.items():
             assert (said in note) == used[what], (name, what)
+        body = text.split("</style>")[1]
+        found = {said: len(re.findall(begins, body)) for begins, said in ON_SCREEN.items()}
+        assert sum(found.values()) == body.count("on-screen"), "each is of a kind that has words"
+        assert all((said in note) == (count > 0) for said, count in found.items()), (name, found)
         assert "what is folded" in note and ".html</code>" in note
         assert 'summary::after{content:" \\2013 folded, not printed"}' in PAPER
         assert len(re.findall("<details", text)) == len(
