@@ -20,7 +20,7 @@ from pathlib import Path
 
 from flows.estimate import estimate
 from flows.judged import GOES_ON, judged, last_gate
-from genpolicy.cli.shell import run_program
+from genpolicy.cli.shell import INTERRUPTED, run_program
 from genpolicy.errors import BadInputError, GenpolicyError
 from genpolicy.outputs import require_own_files
 
@@ -198,7 +198,7 @@ def reproduce_here(
         )
     except KeyboardInterrupt:
         print("Interrupted: DVC and its stage were stopped.", file=sys.stderr)
-        return EXIT_FAULT
+        return INTERRUPTED
     if outcome.code != EXIT_DONE:
         print(f"\nThe ladder stopped: {outcome.sentence}", file=sys.stderr)
     return outcome.code

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from flows import commands
-from flows.reproduce import _outcome, reproduce, stop_group
+from flows.reproduce import _outcome, reproduce, reproduce_here, stop_group
 from flows.workspace import make_workspace
 from genpolicy.cli.shell import run_program
 
@@ -150,6 +150,19 @@ def test_a_stop_ends_the_stage_that_dvc_started_too(tmp_path: Path) -> None:
     assert process.poll() is not None
     status = Path(f"/proc/{file.read_text()}/status")
     assert not status.exists() or "zombie" in status.read_text()
+
+
+def test_who_interrupts_the_ladder_reads_the_code_of_an_interrupt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(workspace: Path, **_: object) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "dvc.yaml").write_text("stages: {}\n")
+    monkeypatch.setattr("flows.reproduce.reproduce", stopped)
+    monkeypatch.setattr("flows.reproduce.signal.signal", lambda *_: None)
+    assert reproduce_here(tmp_path, stages=["gate_a"]) == 130
+    assert "DVC and its stage were stopped" in capsys.readouterr().err
 
 
 def test_driving_the_ladder_without_a_server_does_not_load_prefect() -> None:
