@@ -116,8 +116,10 @@ def _asked_again(
                     stated, end = told.get(key), known.get(key)
                     if stated is None or end is None:
                         refuse("E", f"{SEARCHED}: {key}", "missing", "a row and a rollout")
-                    near = np.allclose(stated.point, one.point, rtol=0.0, atol=CLOSE)
-                    if len(stated.point) != len(one.point) or not near:
+                    # Lengths first: points of unequal lengths cannot be subtracted.
+                    if len(stated.point) != len(one.point) or not np.allclose(
+                        stated.point, one.point, rtol=0.0, atol=CLOSE
+                    ):
                         limit = f"{one.point}, which the search asks for"
                         refuse("E", f"{SEARCHED}: {key}: point", f"{stated.point}", limit)
                     row = _row(task, condition, stated, end)

@@ -80,6 +80,8 @@ def test_nothing_written_is_nothing_to_prove(tmp_path, params):
         (lambda r: [replace(r, outcome="other")], "outcome"),
         (lambda r: [replace(r, worth=0.9)], "worth"),
         (lambda r: [replace(r, point=(0.5, *r.point[1:]))], "point"),
+        (lambda r: [replace(r, point=r.point[:-1])], "point is .* which the search asks for"),
+        (lambda r: [replace(r, point=())], "point is .* which the search asks for"),
         (lambda r: [replace(r, scene_start="{}")], "scene_start"),
         (lambda r: [replace(r, start_sha256="0" * 64)], "start_sha256"),
         (lambda r: [replace(r, severity=0.01)], "severity"),
