@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
+from gates.rederive_checked import rederive_checked
 from gates.rederive_shadow import TaskSection
 from gates.report import read_report
 from gates.reproducibility.settings import RELOAD
 from gates.stated import compare_keys, compare_rows, refuse, root_seed, section, training_seed
 from genpolicy.evidence.documents.failures import FAILURE, Failure
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
-from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.failure_search.conditions import Condition, searched_conditions
 from genpolicy.evidence.failure_search.rollouts import Asked, asked_for, search_with, worth_of
 from genpolicy.evidence.failure_search.settings import search_settings
@@ -33,7 +33,6 @@ from genpolicy.evidence.failure_search.tables import (
     failure_name,
 )
 from genpolicy.evidence.rows.failures import SearchedRow
-from genpolicy.evidence.shadow.tables import checked
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Event, read_journal
@@ -41,7 +40,6 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import Task, WorldSettings, load_task
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -79,12 +77,8 @@ def rederive_searched(
     stated = [asdict(row) for row in rows]
     compare_rows("E", SEARCHED, ROLLOUT, stated, again, seed=seed, origin="its search")
     _files(root, params, rows, journals)
-    if not journals:
-        return
-    read = checked({one.name: check_journal(one, *held_to).as_document() for one in journals})
-    plain = CHECKER.plain(CHECKER.read(folder))
-    where = f"{FAILURE_SEARCH}/{CHECKER.file}"
-    compare_keys("E", where, plain, CHECKER.plain(read), "as checked again")
+    if journals:
+        rederive_checked(root, "E", FAILURE_SEARCH, held_to, journals)
 
 
 def _asked_again(
