@@ -16,6 +16,7 @@ import numpy as np
 
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
 from gates.rederive_checked import rederive_checked
+from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import TaskSection
 from gates.report import read_report
 from gates.reproducibility.settings import RELOAD
@@ -62,7 +63,8 @@ def rederive_searched(
 
     Raises:
         RefusedError: A row, a rollout, the file of a failure or a finding of the checker is not
-            what follows from the journals, or the search would have asked for something else.
+            what follows from the journals, a session was made by another policy, or the search
+            would have asked for something else.
         IntegrityError: A file is missing or no regular file.
         BadInputError: A file cannot be read.
     """
@@ -76,6 +78,7 @@ def rederive_searched(
     again = _asked_again(root, params, rows, ended)
     stated = [asdict(row) for row in rows]
     compare_rows("E", SEARCHED, ROLLOUT, stated, again, seed=seed, origin="its search")
+    rederive_sessions(root, "E", params, journals)
     _files(root, params, rows, journals)
     if journals:
         rederive_checked(root, "E", FAILURE_SEARCH, held_to, journals)
