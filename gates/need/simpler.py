@@ -22,9 +22,9 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
-from gates.recount import AtLeast, Subset, Term, all_hold, is_one
+from gates.recount import AtLeast, Subset, Term, all_hold, is_one, part_said, part_share
 from gates.report import Recount
-from gates.words import length, number, percent, share_of, three
+from gates.words import length, number, percent, three
 from genpolicy.evidence.documents.given import VARIANTS, TrainedVariant
 from genpolicy.evidence.documents.need import LATENT
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
@@ -157,12 +157,12 @@ class ValidShare:
     @property
     def share(self) -> float:
         """The share itself."""
-        return (self.recount.part or 0.0) / self.recount.whole
+        return part_share(self.recount)
 
     @property
     def said(self) -> str:
         """The same with its counts."""
-        return share_of(self.recount.part or 0.0, self.recount.whole, "situations")
+        return part_said(self.recount, "situations")
 
 
 def valid_share(table: str, rows: pd.DataFrame, of: Term, *, confidence: float) -> ValidShare:

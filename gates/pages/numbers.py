@@ -88,10 +88,12 @@ def recounted(recount: Recount) -> str:
     """
     where = " and ".join(recount.where) or "all rows"
     if recount.of:
+        total = f"{where}: {recount.of} adds up to {number(recount.whole)}"
+        if recount.part is None:
+            return total
         parts = " and ".join(recount.summed)
         adds = f"add{'' if len(recount.summed) > 1 else 's'} up to"
-        added = f"{parts} {adds} {number(recount.part or 0.0)}"
-        return f"{where}: {recount.of} adds up to {number(recount.whole)}, {added}"
+        return f"{total}, {parts} {adds} {number(recount.part)}"
     rows = f"{where}: {number(recount.whole)} row{'' if recount.whole == 1 else 's'}"
     if recount.part is None:
         return rows

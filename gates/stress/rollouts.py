@@ -10,11 +10,11 @@ from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.recount import Subset, is_one
+from gates.recount import Subset, is_one, part_said, part_share
 from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
 from gates.stress.weights import Weights, explained, require_weights
-from gates.words import percent, share_of
+from gates.words import percent
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
@@ -226,7 +226,7 @@ def _counted(point: float, recount: Recount, said: Callable[[float], str]) -> st
     if recount.part is None:
         return said(point)
     units = recount.of.replace("_", " ") or "rollouts"
-    return share_of(recount.part, recount.whole, units)
+    return part_said(recount, units)
 
 
 def success_lower(
@@ -251,7 +251,7 @@ def success_lower(
         recount = subset.counted(part, SUCCEEDED)
         found.append((lower, upper, condition, part["start"].nunique(), recount))
     lower, upper, condition, starts, recount = min(found, key=lambda one: one[:3])
-    share = share_of(recount.part or 0.0, recount.whole, "rollouts")
+    share = part_said(recount, "rollouts")
     text = f"{condition}: {share} succeed; at least {percent(lower)}, by {starts} starts"
     counted = f"{starts} starts"
     return Measured(
@@ -260,5 +260,5 @@ def success_lower(
         text,
         counted=counted,
         recount=recount,
-        point=(recount.part or 0.0) / recount.whole,
+        point=part_share(recount),
     )
