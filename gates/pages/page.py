@@ -54,7 +54,7 @@ from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
 from gates.pages.numbers import human, judged_at, limit_said, recounted, rests_on
-from gates.pages.rows import CRITERIA, rows_of
+from gates.pages.rows import CRITERIA, Rows, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
@@ -114,8 +114,14 @@ def exact(value: float) -> str:
     return json.dumps(value)
 
 
-def gate_page(root: Path, report: GateReport) -> str:
-    """HTML of one gate's report; figures are drawn from the evidence below `root`."""
+def gate_page(root: Path, report: GateReport, *, rows: Rows | None = None) -> str:
+    """HTML of one gate's report; figures are drawn from the evidence below `root`.
+
+    Args:
+        root: Below which evidence lies.
+        report: The report.
+        rows: Files of rows that are printed beside it; read below `root` where none are given.
+    """
     state, card, signing = card_shown(root, report)
     return _render(
         "gate.html",
@@ -137,7 +143,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         card_state=state,
         signing=signing,
         overridden=[said(entry) for entry in report.overrides],
-        rows=rows_of(root, report),
+        rows=rows or rows_of(root, report),
         rows_of_criteria=CRITERIA,
         digest=sha256_bytes(report_bytes(report)),
     )
