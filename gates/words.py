@@ -37,14 +37,15 @@ def number(count: float) -> str:
 
 def length(metres: float) -> str:
     """A length below a metre in mm."""
-    return _milli(metres, "m")
+    return in_milli(metres, "m")
 
 
 def duration(seconds: float) -> str:
     """A time below a second in ms."""
-    return _milli(seconds, "s")
+    return in_milli(seconds, "s")
 
 
-def _milli(value: float, unit: str) -> str:
+def in_milli(value: float, unit: str) -> str:
+    """A number with its unit; below 1 in thousandths of it."""
     small = abs(value) < 1 and value != 0
     return f"{three(1000 * value)} m{unit}" if small else f"{three(value)} {unit}"
