@@ -26,14 +26,8 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.failure_search.conditions import Condition, searched_conditions
 from genpolicy.evidence.failure_search.rollouts import Asked, asked_for, search_with, worth_of
 from genpolicy.evidence.failure_search.settings import search_settings
-from genpolicy.evidence.failure_search.tables import (
-    FAILURES,
-    JOURNALS,
-    ROLLOUTS,
-    events_sha256,
-    failure_name,
-)
-from genpolicy.evidence.rows.failures import SearchedRow
+from genpolicy.evidence.failure_search.tables import JOURNALS, ROLLOUTS, events_sha256
+from genpolicy.evidence.rows.failures import FAILURES, SearchedRow, failure_name
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Event, read_journal

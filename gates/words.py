@@ -1,4 +1,10 @@
-"""Numbers in the sentences of criteria: three digits, percent with what they are of, ms and mm."""
+"""Numbers in the sentences of criteria: three digits, percent with what they are of, ms and mm.
+
+What is longer than a reader compares is shown by its beginning.
+"""
+
+SHOWN_HASH = 12
+"""Characters of a hash that a reader compares; the file that is shown has all of it."""
 
 
 def three(value: float) -> str:

@@ -59,6 +59,7 @@ from gates.pages.table import columns, deciding, groups, not_asked, passed_by, s
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from gates.stress.rollouts import ROLLOUTS
+from gates.words import SHOWN_HASH
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCard
 from genpolicy.integrity.hashing import sha256_bytes
@@ -196,7 +197,7 @@ def _said(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(_said, value))
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
-    return f"{text[:12]}…" if HASH.fullmatch(text) else text
+    return f"{text[:SHOWN_HASH]}…" if HASH.fullmatch(text) else text
 
 
 def index_page(root: Path) -> str:
