@@ -152,6 +152,11 @@ def upper_quantile(
     return point, (lower, upper)
 
 
+def mean_gain(differences: Array) -> float:
+    """Mean of paired differences; rounded, since one that is nothing may come out as -1e-18."""
+    return round(float(differences.mean()), 12) + 0.0
+
+
 def draws_for_quantile(quantile: float, confidence: float) -> int:
     """Fewest independent values of which the largest bounds a quantile, 0.5 or above, from above.
 

@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 from gates.report import Answer
+from gates.words import percent
 
 NEAR = 0.9
 """Share of the room from which on little is left, whatever chance does."""
@@ -56,6 +57,11 @@ class Closeness:
             return False
         left = abs((answer.threshold or 0.0) - (answer.measured or 0.0))
         return left < (answer.interval[1] - answer.interval[0]) / 2.0
+
+    @property
+    def said(self) -> str:
+        """How much of its room is used up, in words."""
+        return f"{percent(self.used)} of its room to the limit is used up"
 
     @property
     def near(self) -> bool:

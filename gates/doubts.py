@@ -131,9 +131,8 @@ def _near(report: GateReport) -> Iterator[Doubt]:
     held = [near for near in by_room(list(report.criteria)) if near.near]
     for near in held:
         end = "at the worse end of its interval" if near.worse_end else "at a point"
-        used = f"{100 * near.used:.3g} % of its room to the limit is used up, {end}"
-        used += f"; {BY_CHANCE}" if near.chance else ""
-        yield about(report, "near its limit", near.answer, used)
+        said = f"{near.said}, {end}" + (f"; {BY_CHANCE}" if near.chance else "")
+        yield about(report, "near its limit", near.answer, said)
 
 
 def _at_a_point(report: GateReport) -> Iterator[Doubt]:

@@ -72,6 +72,7 @@ PLANNED: Mapping[str, Planned] = {
 IF_STATED: Mapping[str, Planned] = {"gate_d.utility": Planned("", "D")}
 """What it names only where it is stated: without weights success is compared, as in every plan that
 is older than they are."""
+STATED: Mapping[str, Planned] = {**PLANNED, **IF_STATED}
 SECTIONS: Mapping[str, Gate] = {"feasibility": "A", "execution": "C"}
 """Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
 SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
@@ -186,7 +187,7 @@ def _now(params: Mapping[str, Any]) -> dict[str, Any]:
 
 def _side(place: str) -> str:
     """On which side a setting is strict; '' where neither is."""
-    if stated := {**PLANNED, **IF_STATED}.get(place):
+    if stated := STATED.get(place):
         return stated.strict
     section, _, name = place.partition(".")
     if section in SECTIONS:
@@ -198,7 +199,7 @@ def _side(place: str) -> str:
 
 def asked_by(place: str) -> Gate:
     """The lowest gate that a setting of the plan matters to; the first for what nobody knows."""
-    if stated := {**PLANNED, **IF_STATED}.get(place):
+    if stated := STATED.get(place):
         return stated.gate
     section = place.partition(".")[0]
     return next((gate for gate in GATES if stage_of(gate) == section), SECTIONS.get(section, "A"))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gates.evidence import counts, flags, numbers
 from gates.report import Recount
+from gates.words import share_of
 
 Flags = NDArray[np.bool_]
 
@@ -222,6 +223,21 @@ class Subset:
             summed=(),
             part=None,
         )
+
+
+def part_share(recount: Recount) -> float:
+    """The part of the whole, where more than rows is counted."""
+    return _part(recount) / recount.whole
+
+
+def part_said(recount: Recount, units: str) -> str:
+    """The same with its counts: `96 % (48 of 50 rollouts)`."""
+    return share_of(_part(recount), recount.whole, units)
+
+
+def _part(recount: Recount) -> float:
+    assert recount.part is not None, "of rows alone there is no share"
+    return recount.part
 
 
 def _word(value: str | int | bool) -> str:

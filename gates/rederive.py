@@ -14,6 +14,7 @@ from gates.card.searched import FAILURE_SEARCH
 from gates.pages.printing import differing
 from gates.proof import Rung
 from gates.rederive_brought import rederive_brought
+from gates.rederive_checked import rederive_checked
 from gates.rederive_clocks import rederive_clocks
 from gates.rederive_conformance import rederive_conformance
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
@@ -42,9 +43,7 @@ from gates.stated import (
 from gates.stress.rollouts import FAULTS
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError, GenpolicyError, RefusedError
-from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import ENVELOPE, POWER
-from genpolicy.evidence.shadow.tables import checked
 from genpolicy.evidence.stress.envelope import envelope_document
 from genpolicy.evidence.stress.perturbations import ReducedEnvelope
 from genpolicy.evidence.stress.settings import ENVELOPE as CONDITION
@@ -58,14 +57,12 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.recoveries import KEYS as RECOVERY
 from genpolicy.verification.refused import RefusedCandidates
-from genpolicy.verification.report import JournalReport
 from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.spliced import Spliced
 from genpolicy.verification.tables import KEYS, derived_tables
@@ -138,7 +135,7 @@ def _evidence(root: Path, gate: Gate) -> None:
     folder, pattern = FOLDERS[gate]
     journals = sorted((root / folder).glob(pattern))
     held_to = _held_to(params)
-    _check(root, gate, held_to, journals)
+    rederive_checked(root, gate, folder, held_to, journals)
     rederive_sessions(root, gate, params, journals)
     if gate == "C":
         rederive_shadow(root, params)
@@ -189,33 +186,6 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
     task = load_task(section(params, "task", TaskSection).name)
     cell = cell_of(task, feasibility, action_period_s=horizons.action_period_s)
     return expected, expected_motion(cell, task.action_at)
-
-
-def _check(
-    root: Path,
-    gate: Gate,
-    held_to: tuple[ExpectedSettings, ExpectedMotion],
-    journals: list[Path],
-) -> None:
-    """The checker's document, made again under the settings of `params.yaml`."""
-    expected, motion = held_to
-    again = checked(
-        {path.name: check_journal(path, expected, motion).as_document() for path in journals}
-    )
-    folder = FOLDERS[gate][0]
-    path, stated = f"{folder}/{CHECKER.file}", CHECKER.read(root / folder)
-    for name in sorted({*again.journals, *stated.journals}):
-        claimed, found = stated.journals.get(name), again.journals.get(name)
-        if claimed != found:
-            limit = f"{_totals(found)}, as checked again"
-            refuse(gate, f"{path}: {name}", _totals(claimed), limit)
-    compare_keys(gate, path, CHECKER.plain(stated), CHECKER.plain(again), "as checked again")
-
-
-def _totals(report: JournalReport | None) -> str:
-    if report is None:
-        return "nothing"
-    return f"{len(report.violations)} violations in {report.checked_actions} actions"
 
 
 def _tables(

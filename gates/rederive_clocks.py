@@ -10,18 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from gates.rederive_checked import rederive_checked
 from gates.rederive_sessions import TOLERANCE, rederive_sessions
 from gates.rederive_shadow import DATASET, TaskSection
-from gates.stated import compare_keys, compare_rows, refuse, root_seed, section
+from gates.stated import compare_rows, refuse, root_seed, section
 from gates.stress.clocks import WALL_CLOCK
 from genpolicy.data.dataset import load_dataset
-from genpolicy.evidence.documents.shadow import CHECKER
-from genpolicy.evidence.shadow.tables import checked
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.begun import Begun, begun_sessions
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.clocks import derived_windows
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
@@ -57,9 +55,7 @@ def rederive_clocks(
     if not folder.is_dir():
         return
     journals = sorted(folder.glob("journals/*.mcap"))
-    again = checked({path.name: check_journal(path, *held_to).as_document() for path in journals})
-    stated, where = CHECKER.read(folder), f"{WALL_CLOCK}/{CHECKER.file}"
-    compare_keys("D", where, CHECKER.plain(stated), CHECKER.plain(again), "as checked again")
+    rederive_checked(root, "D", WALL_CLOCK, held_to, journals)
     rederive_sessions(root, "D", params, journals, recorded=True)
     _rederive_windows(root, params, journals)
     deadline_s = section(params, "execution", ExecutionSettings).deadline_s

@@ -10,20 +10,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from gates.rederive_checked import rederive_checked
 from gates.rederive_shadow import TaskSection
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
-from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import start_hashes
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.shadow.tables import checked
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import load_task
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -75,7 +73,4 @@ def rederive_monitors(
     planned = start_hashes(task, settings, root_seed=root_seed(params))
     named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
     compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
-    read = checked({path.name: check_journal(path, *held_to).as_document() for path in journals})
-    where = f"{MONITORS}/{CHECKER.file}"
-    plain = CHECKER.plain(CHECKER.read(folder))
-    compare_keys("D", where, plain, CHECKER.plain(read), "as checked again")
+    rederive_checked(root, "D", MONITORS, held_to, journals)

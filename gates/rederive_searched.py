@@ -15,25 +15,19 @@ from typing import Any
 import numpy as np
 
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
+from gates.rederive_checked import rederive_checked
+from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import TaskSection
 from gates.report import read_report
 from gates.reproducibility.settings import RELOAD
 from gates.stated import compare_keys, compare_rows, refuse, root_seed, section, training_seed
 from genpolicy.evidence.documents.failures import FAILURE, Failure
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
-from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.failure_search.conditions import Condition, searched_conditions
 from genpolicy.evidence.failure_search.rollouts import Asked, asked_for, search_with, worth_of
 from genpolicy.evidence.failure_search.settings import search_settings
-from genpolicy.evidence.failure_search.tables import (
-    FAILURES,
-    JOURNALS,
-    ROLLOUTS,
-    events_sha256,
-    failure_name,
-)
-from genpolicy.evidence.rows.failures import SearchedRow
-from genpolicy.evidence.shadow.tables import checked
+from genpolicy.evidence.failure_search.tables import JOURNALS, ROLLOUTS, events_sha256
+from genpolicy.evidence.rows.failures import FAILURES, SearchedRow, failure_name
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Event, read_journal
@@ -41,7 +35,6 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import Task, WorldSettings, load_task
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -64,7 +57,8 @@ def rederive_searched(
 
     Raises:
         RefusedError: A row, a rollout, the file of a failure or a finding of the checker is not
-            what follows from the journals, or the search would have asked for something else.
+            what follows from the journals, a session was made by another policy, or the search
+            would have asked for something else.
         IntegrityError: A file is missing or no regular file.
         BadInputError: A file cannot be read.
     """
@@ -78,13 +72,10 @@ def rederive_searched(
     again = _asked_again(root, params, rows, ended)
     stated = [asdict(row) for row in rows]
     compare_rows("E", SEARCHED, ROLLOUT, stated, again, seed=seed, origin="its search")
+    rederive_sessions(root, "E", params, journals)
     _files(root, params, rows, journals)
-    if not journals:
-        return
-    read = checked({one.name: check_journal(one, *held_to).as_document() for one in journals})
-    plain = CHECKER.plain(CHECKER.read(folder))
-    where = f"{FAILURE_SEARCH}/{CHECKER.file}"
-    compare_keys("E", where, plain, CHECKER.plain(read), "as checked again")
+    if journals:
+        rederive_checked(root, "E", FAILURE_SEARCH, held_to, journals)
 
 
 def _asked_again(
@@ -116,8 +107,10 @@ def _asked_again(
                     stated, end = told.get(key), known.get(key)
                     if stated is None or end is None:
                         refuse("E", f"{SEARCHED}: {key}", "missing", "a row and a rollout")
-                    near = np.allclose(stated.point, one.point, rtol=0.0, atol=CLOSE)
-                    if len(stated.point) != len(one.point) or not near:
+                    # Lengths first: points of unequal lengths cannot be subtracted.
+                    if len(stated.point) != len(one.point) or not np.allclose(
+                        stated.point, one.point, rtol=0.0, atol=CLOSE
+                    ):
                         limit = f"{one.point}, which the search asks for"
                         refuse("E", f"{SEARCHED}: {key}: point", f"{stated.point}", limit)
                     row = _row(task, condition, stated, end)

@@ -42,7 +42,8 @@ def rederive_sessions(
 ) -> None:
     """Hold the maker of every session against the trained policies, and its start against the plan.
 
-    Gate C changes the active maker within a session on purpose; there the first one counts.
+    Gate C changes the active maker within a session on purpose; there the first one counts. What
+    Gate E reads began where a search asked for it, which is asked where the search is done again.
 
     Args:
         root: Root of the workspace.
@@ -58,7 +59,7 @@ def rederive_sessions(
         BadInputError: A file cannot be read.
     """
     seed = training_seed(params)
-    simulated = gate == "D" and not recorded
+    simulated = gate != "C" and not recorded
     joining = section(params, "stress", StressSettings).joining if simulated else REPLACING
 
     @cache
@@ -68,7 +69,7 @@ def rederive_sessions(
             return other.sha256, joining.named(method).sampler_hash(other.sampler_sha256)
         return _maker(root, method, seed, joining.named(method))
 
-    planned = _planned(params) if simulated else []
+    planned = _planned(params) if simulated and gate == "D" else None
     for path in journals:
         with readable(f"{path.parent.name}/{path.name}"):
             sessions = begun_sessions(path)
@@ -80,7 +81,7 @@ def rederive_sessions(
                     made = ", ".join(sorted(checkpoint for checkpoint, _ in others)) or "nobody"
                     refuse(gate, f"{place}: made by", made, "the policy of that name, as trained")
                 _joined(gate, place, session, joining)
-                if simulated:
+                if planned is not None:
                     _began(gate, place, session, planned)
 
 

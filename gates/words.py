@@ -1,4 +1,10 @@
-"""Numbers in the sentences of criteria: three digits, percent with what they are of, ms and mm."""
+"""Numbers in the sentences of criteria: three digits, percent with what they are of, ms and mm.
+
+What is longer than a reader compares is shown by its beginning.
+"""
+
+SHOWN_HASH = 12
+"""Characters of a hash that a reader compares; the file that is shown has all of it."""
 
 
 def three(value: float) -> str:
@@ -37,14 +43,15 @@ def number(count: float) -> str:
 
 def length(metres: float) -> str:
     """A length below a metre in mm."""
-    return _milli(metres, "m")
+    return in_milli(metres, "m")
 
 
 def duration(seconds: float) -> str:
     """A time below a second in ms."""
-    return _milli(seconds, "s")
+    return in_milli(seconds, "s")
 
 
-def _milli(value: float, unit: str) -> str:
+def in_milli(value: float, unit: str) -> str:
+    """A number with its unit; below 1 in thousandths of it."""
     small = abs(value) < 1 and value != 0
     return f"{three(1000 * value)} m{unit}" if small else f"{three(value)} {unit}"

@@ -25,7 +25,7 @@ from gates.card.card import (
 )
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
 from gates.card.papers import Papers, examine
-from gates.card.people import ALLOW_LIST, REVIEWER, load_allow_list
+from gates.card.people import ALLOW_LIST, SIGNERS, load_allow_list
 from gates.card.rollback import require_rollback
 from gates.card.searched import SEARCHED, searched_caveats
 from gates.card.signing import (
@@ -275,7 +275,7 @@ def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
         for person in load_allow_list(evidence.root).people
         if person.id not in found.card.authors
     }
-    in_turn = {person.role for person in found.signers} <= {REVIEWER, *OWNERS}
+    in_turn = {person.role for person in found.signers} <= set(SIGNERS)
     text = f"missing: {', '.join(missing)}" if missing else ""
     return Measured(float(len(roles)), caveat=text, pending=in_turn and able.issuperset(missing))
 

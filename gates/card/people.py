@@ -20,7 +20,9 @@ from genpolicy.integrity.documents import read_yaml
 
 ALLOW_LIST = "reviewers.yaml"
 REVIEWER, AUTHOR, SPOTTER = "reviewer", "author", "spotter"
-ROLES = (REVIEWER, *OWNERS, AUTHOR, SPOTTER)
+SIGNERS = (REVIEWER, *OWNERS)
+"""Roles whose signatures a card needs, each of one person, in the order in which they are told."""
+ROLES = (*SIGNERS, AUTHOR, SPOTTER)
 BE_LISTED = (
     f"Give the id as {ALLOW_LIST} writes it. Who is not on it runs `genpolicy card keygen`, and "
     "has the entry that it prints committed there, in review."

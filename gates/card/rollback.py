@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.report import Gate, GateReport, parse_section
 from gates.stress.rollouts import ROLLOUTS, StressSettings
-from gates.stress.utility import utilities
+from gates.stress.utility import mean_worth
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.evidence.rows.stress import RolloutRow
 
@@ -62,9 +62,7 @@ def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollb
         rows = rows[rows["perturbation"].isin(settings.perturbations)]
         tried = {name: rows[rows["method"] == name] for name in settings.baselines}
         worth = {
-            name: float(utilities(evidence, settings, name, of).mean())
-            for name, of in tried.items()
-            if len(of)
+            name: mean_worth(evidence, settings, name, of) for name, of in tried.items() if len(of)
         }
     except (MissingEvidenceError, ConfigError) as error:
         raise _unknown(ROLLOUTS, str(error), "rollouts of the simple methods") from error

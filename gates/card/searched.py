@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gates.words import SHOWN_HASH
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.rows.failures import SearchedRow
 from genpolicy.integrity.hashing import sha256_file
@@ -22,7 +23,6 @@ NOBODY = (
     "No failure was searched for beside the planned rollouts (card.failure_search): nobody knows "
     "where between the planned starts and sizes the candidate begins to fail."
 )
-SHOWN_HASH = 12
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
         _check_fixed(root, card, where)
         payload = statement(root, card)
     _check_signable(card, person, allowed, where)
-    target = root / CARDS / f"{card.name}.dsse.json"
+    target = root / envelope_path(card.name)
     if target.exists():
         signatures = _with_those_of(root, target, payload, signatures, allowed)
     if person.key.keyid in {entry["keyid"] for entry in signatures}:

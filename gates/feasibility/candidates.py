@@ -21,7 +21,7 @@ from gates.feasibility.settings import (
     UNKNOWN,
     FeasibilitySettings,
 )
-from gates.recount import NotAll, Subset, all_hold, is_none, is_one
+from gates.recount import NotAll, Subset, all_hold, is_none, is_one, part_said
 from gates.words import length, number, percent, share_of, three
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.statistics.intervals import clopper_pearson
@@ -139,7 +139,7 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
     )
     recount = HELD_OUT_ROWS.counted(rows, *ADMISSIBLE)
     text = (
-        f"{share_of(recount.part or 0.0, recount.whole, 'candidates')} at "
+        f"{part_said(recount, 'candidates')} at "
         f"{number(rows['observation'].nunique())} observations; lower bound over "
         f"{number(episodes.nunique())} episodes, whose observations are not "
         f"independent{_unknown(rows)}"

@@ -10,7 +10,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.need.cause import as_the_cause, asked, found_cause
 from gates.need.settings import AUDIT, NeedSettings
-from gates.recount import AtLeast, Subset, all_hold, is_one
+from gates.recount import AtLeast, Subset, all_hold, is_one, part_said
 from gates.words import number, share_of
 from genpolicy.audit.rows import RecoveryOutcome, SituationRow
 
@@ -119,7 +119,7 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     episodes = rows["episode_uuid"].nunique()
     recount = subset.counted(rows, *DEFEATED)
     text = (
-        f"{share_of(recount.part or 0.0, recount.whole, 'situations')}; lower bound over "
+        f"{part_said(recount, 'situations')}; lower bound over "
         f"{number(episodes)} episodes, whose situations are not independent; "
         f"{_median(evidence, settings)}"
     )

@@ -22,9 +22,9 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
-from gates.recount import AtLeast, Subset, Term, all_hold, is_one
+from gates.recount import AtLeast, Subset, Term, all_hold, is_one, part_said, part_share
 from gates.report import Recount
-from gates.words import length, number, percent, share_of, three
+from gates.words import length, number, percent, three
 from genpolicy.evidence.documents.given import VARIANTS, TrainedVariant
 from genpolicy.evidence.documents.need import LATENT
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
@@ -62,15 +62,7 @@ def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured
         f"an admissible chunk of {method} reaches a mode in {found.said}; upper bound over "
         f"{number(found.episodes)} episodes"
     )
-    counted = f"{found.episodes} episodes"
-    return Measured(
-        found.upper,
-        (found.lower, found.upper),
-        text,
-        counted=counted,
-        recount=found.recount,
-        point=found.share,
-    )
+    return found.measured(text)
 
 
 @criterion(
@@ -157,12 +149,23 @@ class ValidShare:
     @property
     def share(self) -> float:
         """The share itself."""
-        return (self.recount.part or 0.0) / self.recount.whole
+        return part_share(self.recount)
 
     @property
     def said(self) -> str:
         """The same with its counts."""
-        return share_of(self.recount.part or 0.0, self.recount.whole, "situations")
+        return part_said(self.recount, "situations")
+
+    def measured(self, text: str) -> Measured:
+        """Its upper end, which is what is judged; with a sentence of it."""
+        return Measured(
+            self.upper,
+            (self.lower, self.upper),
+            text,
+            counted=f"{self.episodes} episodes",
+            recount=self.recount,
+            point=self.share,
+        )
 
 
 def valid_share(table: str, rows: pd.DataFrame, of: Term, *, confidence: float) -> ValidShare:
@@ -276,15 +279,7 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{best.said}; upper bound over {number(best.episodes)} episodes, level divided among the "
         "variants; short training"
     )
-    counted = f"{best.episodes} episodes"
-    return Measured(
-        best.upper,
-        (best.lower, best.upper),
-        text,
-        counted=counted,
-        recount=best.recount,
-        point=best.share,
-    )
+    return best.measured(text)
 
 
 def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:

@@ -8,11 +8,11 @@ from typing import Any
 
 from gates.card.card import DRAFT_PATH, TrialCard
 from gates.card.papers import examine
-from gates.card.people import REVIEWER
+from gates.card.people import SIGNERS
 from gates.evidence import Evidence
 from gates.pages.desk_card import Signing, signing_of
 from gates.pages.guide import label
-from gates.report import GATES, OWNERS, Gate, GateReport, read_report
+from gates.report import GATES, Gate, GateReport, read_report
 from genpolicy.errors import IntegrityError
 
 BESIDE = (
@@ -54,7 +54,7 @@ def card_shown(root: Path, report: GateReport) -> tuple[str, Fields, Signing | N
         return "", [], None
     state = "draft, not signed"
     if papers.signed:
-        asked = {REVIEWER, *OWNERS}
+        asked = set(SIGNERS)
         found = asked & {person.role for person in papers.signed.signers}
         state = "signed" if found == asked else f"signed by {len(found)} of {len(asked)}"
     signing = signing_of(_below(root, report), Evidence(root), papers)

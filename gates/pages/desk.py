@@ -268,9 +268,8 @@ def remark(answer: Answer) -> str:
     near = closeness(answer)
     if near is None:
         return "holds exactly; there is no room to speak of"
-    used = f"{100 * near.used:.3g} % of its room to the limit is used up"
     if near.near:
-        return f"near: {used}; {BY_CHANCE}" if near.chance else f"near: {used}"
+        return f"near: {near.said}" + (f"; {BY_CHANCE}" if near.chance else "")
     if answer.interval is None:
-        return f"{used}; no interval says how sure that is"
-    return used if near.worse_end else f"{used}, at {judged_at(answer)}"
+        return f"{near.said}; no interval says how sure that is"
+    return near.said if near.worse_end else f"{near.said}, at {judged_at(answer)}"

@@ -10,14 +10,15 @@ from dataclasses import dataclass
 from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard, missing_fields
 from gates.card.envelope import ENVELOPE_FILE
 from gates.card.papers import Papers, examine
-from gates.card.people import REVIEWER
+from gates.card.people import REVIEWER, SIGNERS
 from gates.card.rollback import rollback_of
 from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
 from gates.pages.numbers import at_its_end, human
-from gates.report import OWNERS, Answer, Gate, GateReport, Point
+from gates.report import Answer, Gate, GateReport, Point
 from gates.stress.rollouts import ROLLOUTS, STRESS
+from gates.words import SHOWN_HASH
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.stress import ENVELOPE
 from genpolicy.evidence.rows.stress import RolloutRow
@@ -39,8 +40,6 @@ ABORTS = {
 }
 """What each abort threshold of a card ends the trial at, in words."""
 MM_PER_M = 1000.0
-SHOWN_HASH = 12
-"""Characters of a hash that a reader compares; the card holds all of it."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,7 @@ def signing_of(
         items=_items(draft, papers.signed.card if papers.signed else None, reports, evidence),
         caveats=len(draft.caveats),
         signed=tuple(f"{person.id} ({person.role})" for person in people),
-        lacking=tuple(role for role in (REVIEWER, *OWNERS) if role not in roles),
+        lacking=tuple(role for role in SIGNERS if role not in roles),
         fields=tuple(
             name
             for name in missing_fields(papers.signed.card if papers.signed else draft)

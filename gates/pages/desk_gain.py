@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import ValidationError
 
+from gates.bounds import mean_gain
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.pages.bound import require_bound
 from gates.report import Gate, GateReport
@@ -12,7 +13,7 @@ from gates.stress.gate import best_baseline
 from gates.stress.pairs import paired_differences
 from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import ROLLOUTS, StressSettings, rollouts
-from gates.stress.utility import utilities
+from gates.stress.utility import mean_worth
 from gates.stress.weights import RECOVERY, by_cost, listed
 from genpolicy.statistics.eprocess import gain_interval
 
@@ -43,7 +44,10 @@ def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
     low, high = gain_interval(differences, alpha=settings.alpha)
     by, worth, of = "", "", ""
     if settings.utility:
-        means = [_worth(evidence, settings, method) for method in (promoted, best)]
+        means = [
+            mean_worth(evidence, settings, method, rollouts(evidence, settings, method))
+            for method in (promoted, best)
+        ]
         by, of = " by utility", " of utility"
         worth = (
             f". As utility, a success less {listed(settings.utility)}, that is worth "
@@ -52,17 +56,11 @@ def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
     return (
         f"{promoted} succeeds in {_share(evidence, settings, promoted)}, the best simple policy"
         f"{by}, {best}, in {_share(evidence, settings, best)}{worth}: "
-        f"{_points(differences.mean())} points{of} on "
+        f"{_points(mean_gain(differences))} points{of} on "
         f"the same {len(differences)} starts in {len(settings.perturbations)} conditions, between "
         f"{_points(low)} and {_points(high)} (each end wrong with at most "
         f"{100 * settings.alpha:.3g} %); more than {_points(settings.margin)} had to be shown."
     )
-
-
-def _worth(evidence: Evidence, settings: StressSettings, method: str) -> float:
-    """Mean utility of the rollouts of a method."""
-    rows = rollouts(evidence, settings, method)
-    return float(utilities(evidence, settings, method, rows).mean())
 
 
 def _share(evidence: Evidence, settings: StressSettings, method: str) -> str:

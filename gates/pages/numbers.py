@@ -8,7 +8,7 @@ import re
 from gates.closeness import EVIDENCE, RATIO
 from gates.pages.guide import unit
 from gates.report import Answer, Recount
-from gates.words import number, three
+from gates.words import in_milli, number, percent, three
 
 RATES = (
     "_share",
@@ -38,15 +38,15 @@ def human(answer: Answer, value: float | None) -> str:
     if value is None:
         return "not measured"
     suffix = unit(answer.id)
-    if suffix in ("s", "m") and abs(value) < 1 and value != 0:
-        return f"{three(1000 * value)} m{suffix}"
+    if suffix in ("s", "m"):
+        return in_milli(value, suffix)
     if suffix:
         return f"{three(value)} {suffix}"
     if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
         return f"×{three(value)}" if RATIO in answer.id else f"{three(value)} to 1"
     if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
-        return f"{three(100 * value)} %"
-    return three(value) if value != int(value) else f"{int(value):,}"
+        return percent(value)
+    return number(value)
 
 
 def limit_said(answer: Answer) -> str:
@@ -88,10 +88,12 @@ def recounted(recount: Recount) -> str:
     """
     where = " and ".join(recount.where) or "all rows"
     if recount.of:
+        total = f"{where}: {recount.of} adds up to {number(recount.whole)}"
+        if recount.part is None:
+            return total
         parts = " and ".join(recount.summed)
         adds = f"add{'' if len(recount.summed) > 1 else 's'} up to"
-        added = f"{parts} {adds} {number(recount.part or 0.0)}"
-        return f"{where}: {recount.of} adds up to {number(recount.whole)}, {added}"
+        return f"{total}, {parts} {adds} {number(recount.part)}"
     rows = f"{where}: {number(recount.whole)} row{'' if recount.whole == 1 else 's'}"
     if recount.part is None:
         return rows
@@ -112,8 +114,8 @@ def between(answer: Answer) -> str:
     if answer.interval is None:
         return ""
     low, high = (human(answer, end) for end in answer.interval)
-    number, _, suffix = low.partition(" ")
-    return f"{number if suffix and high.endswith(f' {suffix}') else low} to {high}"
+    alone, _, suffix = low.partition(" ")
+    return f"{alone if suffix and high.endswith(f' {suffix}') else low} to {high}"
 
 
 def beyond(answer: Answer) -> str:

@@ -54,11 +54,12 @@ from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
 from gates.pages.numbers import human, judged_at, limit_said, recounted, rests_on
-from gates.pages.rows import CRITERIA, rows_of
+from gates.pages.rows import CRITERIA, Rows, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from gates.stress.rollouts import ROLLOUTS
+from gates.words import SHOWN_HASH
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCard
 from genpolicy.integrity.hashing import sha256_bytes
@@ -114,8 +115,14 @@ def exact(value: float) -> str:
     return json.dumps(value)
 
 
-def gate_page(root: Path, report: GateReport) -> str:
-    """HTML of one gate's report; figures are drawn from the evidence below `root`."""
+def gate_page(root: Path, report: GateReport, *, rows: Rows | None = None) -> str:
+    """HTML of one gate's report; figures are drawn from the evidence below `root`.
+
+    Args:
+        root: Below which evidence lies.
+        report: The report.
+        rows: Files of rows that are printed beside it; read below `root` where none are given.
+    """
     state, card, signing = card_shown(root, report)
     return _render(
         "gate.html",
@@ -137,7 +144,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         card_state=state,
         signing=signing,
         overridden=[said(entry) for entry in report.overrides],
-        rows=rows_of(root, report),
+        rows=rows or rows_of(root, report),
         rows_of_criteria=CRITERIA,
         digest=sha256_bytes(report_bytes(report)),
     )
@@ -190,7 +197,7 @@ def _said(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(_said, value))
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
-    return f"{text[:12]}…" if HASH.fullmatch(text) else text
+    return f"{text[:SHOWN_HASH]}…" if HASH.fullmatch(text) else text
 
 
 def index_page(root: Path) -> str:

@@ -16,11 +16,11 @@ def printed_beside(root: Path, report: GateReport) -> dict[str, bytes]:
     """
     report = parse_report(report_bytes(report), gate=report.gate)
     base = Path(report_path(report.gate))
-    rows, folder = printed_rows(rows_of(root, report), report), rows_folder(report.gate)
+    rows, folder = rows_of(root, report), rows_folder(report.gate)
     return {
         base.with_suffix(".md").as_posix(): markdown(report).encode(),
-        base.with_suffix(".html").as_posix(): gate_page(root, report).encode(),
-        **{f"{folder}/{name}": data for name, data in rows.items()},
+        base.with_suffix(".html").as_posix(): gate_page(root, report, rows=rows).encode(),
+        **{f"{folder}/{name}": data for name, data in printed_rows(rows, report).items()},
     }
 
 

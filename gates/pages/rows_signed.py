@@ -3,17 +3,18 @@
 They are of the envelope and the allow-list that the report names; of other bytes nothing is shown.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pyarrow as pa
 
 from gates.card.card import DRAFT_PATH
 from gates.card.papers import Papers, examine
-from gates.card.people import ALLOW_LIST, REVIEWER, Person, load_allow_list
+from gates.card.people import ALLOW_LIST, REVIEWER, SIGNERS, Person, load_allow_list
 from gates.card.signing import envelope_path, statement
 from gates.evidence import Evidence
 from gates.pages.rows_files import RowsFile, sampled
-from gates.report import OWNERS, GateReport
+from gates.report import GateReport
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.hashing import sha256_bytes
 
@@ -49,9 +50,9 @@ def _lines(root: Path, papers: Papers) -> list[tuple[str, ...]]:
         card = papers.signed.card
         days = (card.not_before, card.expires)
         digest = sha256_bytes(statement(root, card))
-    needed = (REVIEWER, *OWNERS)
+    people = _listed(root)
     found: list[tuple[str, ...]] = []
-    for role in needed:
+    for role in SIGNERS:
         own = [person for person in signers if person.role == role]
         found += [
             (role, person.id, fingerprint(person), digest, *days, SIGNED, "") for person in own
@@ -59,8 +60,8 @@ def _lines(root: Path, papers: Papers) -> list[tuple[str, ...]]:
         if not own and papers.present and papers.refusal:
             found.append((role, "", "", "", "", "", REFUSED, papers.refusal))
         elif not own:
-            found.append((role, "", "", digest, *days, WAITS, _who(root, role, papers)))
-    others = (person for person in signers if person.role not in needed)
+            found.append((role, "", "", digest, *days, WAITS, _who(people, role, papers)))
+    others = (person for person in signers if person.role not in SIGNERS)
     return found + [
         (one.role, one.id, fingerprint(one), digest, *days, UNDECIDED, "") for one in others
     ]
@@ -71,13 +72,19 @@ def fingerprint(person: Person) -> str:
     return person.key.keyid[:KEY_DIGITS]
 
 
-def _who(root: Path, role: str, papers: Papers) -> str:
+def _listed(root: Path) -> Sequence[Person] | None:
+    """Everybody on the list; None where it cannot be read."""
+    try:
+        return load_allow_list(root).people
+    except GenpolicyError:
+        return None
+
+
+def _who(people: Sequence[Person] | None, role: str, papers: Papers) -> str:
     """Who of the list may sign in a role; of reviewers the one whom a signed card names."""
     if role == REVIEWER and papers.signed:
         return f"for {papers.signed.card.reviewer}, whom the card names"
-    try:
-        people = load_allow_list(root).people
-    except GenpolicyError:
+    if people is None:
         return f"{ALLOW_LIST} cannot be read"
     names = [person.id for person in people if person.role == role]
     return f"for {' or '.join(names)}" if names else f"nobody on {ALLOW_LIST} has this role"

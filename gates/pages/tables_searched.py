@@ -5,6 +5,7 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.bound import require_bound
 from gates.pages.figures import Listing, Table
 from gates.report import GateReport
+from genpolicy.evidence.rows.failures import FAILURES, failure_name
 
 HEADS = (
     "condition", "candidate", "rollouts, all planned beforehand", "failed",
@@ -22,9 +23,7 @@ def _line(found: Found) -> tuple[str, ...]:
         f"{found.evaluated}",
         f"{found.failed}",
         (size_of(found) or UNSIZED) if row else NONE,
-        f"{row.outcome}, failures/{row.method}__{row.perturbation}__{row.start}.json"
-        if row
-        else NONE,
+        f"{row.outcome}, {FAILURES}/{failure_name(row)}" if row else NONE,
         row.scene_start if row else NONE,
     )
 

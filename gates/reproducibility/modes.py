@@ -8,7 +8,7 @@ import pandas as pd
 from gates.bounds import share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
-from gates.recount import AtLeast, Subset, is_one
+from gates.recount import AtLeast, Subset, is_one, part_said, part_share
 from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
 from gates.words import number, percent, share_of
 from genpolicy.evidence.rows.need import ModeRow
@@ -44,7 +44,7 @@ def mode_coverage_lower(
         found.append((lower, upper, share, recount, rows["episode_uuid"].nunique(), reached))
     lower, upper, share, recount, episodes, reached = min(found, key=lambda seed: seed[0])
     text = (
-        f"in {share_of(recount.part or 0.0, recount.whole, 'two-mode situations')} every mode gets "
+        f"in {part_said(recount, 'two-mode situations')} every mode gets "
         f"at least {percent(settings.mode_minimum_share)} of the samples, admissible; one sample, "
         f"whether or not it may be executed, reaches every mode in "
         f"{share_of(reached, recount.whole)}; lower bound over {number(episodes)} episodes"
@@ -83,11 +83,11 @@ def outside_modes_upper(
         found, key=lambda seed: seed[:4]
     )
     text = (
-        f"{share_of(recount.part or 0.0, recount.whole, 'samples')} in {number(situations)} "
+        f"{part_said(recount, 'samples')} in {number(situations)} "
         f"two-mode situations, {number(far_away)} of them far from every mode; upper bound over "
         f"{number(episodes)} episodes"
     )
-    if not math.isclose(share, (recount.part or 0.0) / recount.whole, abs_tol=1e-9):
+    if not math.isclose(share, part_share(recount), abs_tol=1e-9):
         text += f"; of a mean situation {percent(share)}, which is what is bounded"
     counted = f"{episodes} episodes"
     return Measured(upper, (lower, upper), text, counted=counted, recount=recount, point=share)

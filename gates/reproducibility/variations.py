@@ -8,6 +8,7 @@ is no other policy. What is trained here, and whoever has full precision on the 
 import numpy as np
 import pandas as pd
 
+from gates.claim import trainings
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.reproducibility.settings import (
@@ -70,8 +71,7 @@ def varied_difference(
         for way, part in rows.groupby("variation", sort=False)
         if not (part["unknown"] != "").any()
     ]
-    seeds = rows["seed"].nunique()
-    text = f"chunks not bit-equal, of {seeds} training seed{'s' * (seeds > 1)}: {', '.join(parts)}"
+    text = f"chunks not bit-equal, {trainings(rows['seed'].nunique())}: {', '.join(parts)}"
     if measured.max() > 0.0:
         text += f"; most by {largest['variation']}, in {largest['component']}"
     for way, part in rows[rows["unknown"] != ""].groupby("variation", sort=False):

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
+from gates.bounds import mean_gain
 from gates.claim import IN_SHORT
 from gates.engine import Decision, Judged
 from gates.evidence import Array, Evidence
@@ -136,7 +137,7 @@ def comparisons(
 def compared(better: str, other: str, differences: Array, settings: StressSettings) -> Comparison:
     """One ordered pair: `better` minus `other` on each start. Shape (starts,)."""
     test = paired_e_value(differences, margin=0.0, alpha=pair_alpha(settings))
-    return Comparison(better, other, test.e_value, float(differences.mean()))
+    return Comparison(better, other, test.e_value, mean_gain(differences))
 
 
 def sooner(names: Sequence[str], latency_s: Mapping[str, float]) -> str:

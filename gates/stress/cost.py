@@ -14,7 +14,7 @@ from gates.criterion import Measured, criterion
 from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from gates.floors import OLDEST_ACTION_S
-from gates.recount import AtLeast, Term, is_one
+from gates.recount import AtLeast, Subset, Term, is_one
 from gates.report import Recount
 from gates.stress.rollouts import (
     CURVES,
@@ -29,7 +29,6 @@ from gates.stress.rollouts import (
     in_every_condition,
     rollouts,
     success_lower,
-    within,
 )
 from gates.words import duration, number, percent, three
 from genpolicy.evidence.documents.stress import DISTILLED
@@ -101,9 +100,8 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     )
     if any(recorded.get(key, 0) != count for key, count in stated):
         raise MissingEvidenceError("rollouts state other numbers of invocations than are recorded")
-    warm = WARM.holds(rows)
 
-    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
+    def measure(part: pd.DataFrame, subset: Subset, condition: str) -> tuple[Interval, Recount]:
         if len(part) == 0:
             raise MissingEvidenceError(f"no warm invocation in {condition}: no answer to be timed")
         point, ends = upper_quantile(
@@ -113,12 +111,12 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
             confidence=settings.confidence,
             rng=settings.draws("D", "latency", candidate, condition),
         )
-        subset = within(INVOCATIONS, condition)
-        subset = replace(subset, terms=(*subset.terms, WARM))
         return (point, *ends), subset.counted(part)
 
-    found = in_every_condition(rows[warm], settings.perturbations, measure, duration)
-    text = f"{found.caveat}; {_cold(float(latency[~warm].max(initial=0.0)), settings.oldest_s)}"
+    of = Subset(INVOCATIONS, (WARM,))
+    found = in_every_condition(rows, of, settings.perturbations, measure, duration)
+    cold_s = float(latency[~WARM.holds(rows)].max(initial=0.0))
+    text = f"{found.caveat}; {_cold(cold_s, settings.oldest_s)}"
     for condition in settings.perturbations:
         if said := _uninvoked(rolled, condition):
             text = f"{text}; {said}"
@@ -186,7 +184,7 @@ def _share_of(  # noqa: PLR0917
 ) -> Measured:
     """Upper bound of a share of ticks or invocations; the starts are the draws."""
 
-    def measure(rows: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
+    def measure(rows: pd.DataFrame, subset: Subset, condition: str) -> tuple[Interval, Recount]:
         hits, all_of = numbers(rows, part), numbers(rows, whole)
         if whole == INVOKED and np.any(all_of == 0):
             raise MissingEvidenceError(f"{_uninvoked(rows, condition)}: a share of none is unknown")
@@ -199,11 +197,11 @@ def _share_of(  # noqa: PLR0917
             confidence=settings.confidence,
             rng=settings.draws("D", part, candidate, condition),
         )
-        recount = within(ROLLOUTS, condition).summed(rows, (part,), whole)
-        return (float(hits.sum() / all_of.sum()), *ends), recount
+        return (float(hits.sum() / all_of.sum()), *ends), subset.summed(rows, (part,), whole)
 
     rows = rollouts(evidence, settings, candidate)
-    return in_every_condition(rows, conditions or settings.perturbations, measure, percent)
+    planned = conditions or settings.perturbations
+    return in_every_condition(rows, Subset(ROLLOUTS), planned, measure, percent)
 
 
 @criterion(
@@ -254,16 +252,16 @@ def reset_upper(evidence: Evidence, settings: StressSettings, candidate: str) ->
 def _rollouts_with(rows: pd.DataFrame, hit: Term, settings: StressSettings) -> Measured:
     """Exact upper bound of the share of rollouts that were hit, in every condition."""
 
-    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
+    def measure(part: pd.DataFrame, subset: Subset, _: str) -> tuple[Interval, Recount]:
         interval = share_interval(
             hit.holds(part),
             part["start"].to_numpy(),
             confidence=settings.confidence,
             favourable=False,
         )
-        return interval, within(ROLLOUTS, condition).counted(part, hit)
+        return interval, subset.counted(part, hit)
 
-    return in_every_condition(rows, settings.perturbations, measure, percent)
+    return in_every_condition(rows, Subset(ROLLOUTS), settings.perturbations, measure, percent)
 
 
 @criterion(
@@ -290,7 +288,7 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
             f"condition; {fewest} are needed to bound what 95 % keep"
         )
 
-    def measure(part: pd.DataFrame, condition: str) -> tuple[Interval, Recount]:
+    def measure(part: pd.DataFrame, subset: Subset, condition: str) -> tuple[Interval, Recount]:
         point, ends = upper_quantile(
             numbers(part, "force_peak_n"),
             part["start"].to_numpy(),
@@ -298,9 +296,9 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
             confidence=settings.confidence,
             rng=settings.draws("D", "force", candidate, condition),
         )
-        return (point, *ends), within(ROLLOUTS, condition).counted(part)
+        return (point, *ends), subset.counted(part)
 
-    found = in_every_condition(rows, settings.perturbations, measure, _newtons)
+    found = in_every_condition(rows, Subset(ROLLOUTS), settings.perturbations, measure, _newtons)
     text = f"{found.caveat}; contact on {touched} starts, largest {_newtons(forces.max())}"
     return replace(found, caveat=text)
 

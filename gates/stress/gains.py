@@ -7,6 +7,7 @@ another. Each is told; one is asked: inside the envelope there must be a gain at
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from gates.bounds import mean_gain
 from gates.evidence import Array, Evidence
 from gates.stress.pairs import paired_by_condition, paired_differences
 from gates.stress.rollouts import ENVELOPE, StressSettings
@@ -42,7 +43,7 @@ class Inside:
     @property
     def gain(self) -> float:
         """Mean difference over the starts."""
-        return float(self.differences.mean())
+        return mean_gain(self.differences)
 
     @property
     def starts(self) -> int:
@@ -92,8 +93,7 @@ def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -
     for baseline in settings.baselines:
         pairs = paired_by_condition(evidence, settings, candidate, baseline)
         for condition, found in pairs.items():
-            # Rounded, since a mean over seeds that is nothing may come out as -1e-18.
-            gain = (round(float(found.mean()), 12) + 0.0, baseline)
+            gain = (mean_gain(found), baseline)
             least[condition] = min(least.get(condition, gain), gain)
     told = ", ".join(
         f"{condition} {points(gain)} over {baseline}"
@@ -109,10 +109,8 @@ def in_success(evidence: Evidence, settings: StressSettings, candidate: str, bas
     alone = settings.model_copy(update={"utility": {}})
     differences = paired_differences(evidence, alone, candidate, baseline)
     low, high = gain_interval(differences, alpha=settings.alpha)
-    gain = round(float(differences.mean()), 12) + 0.0
-    return (
-        f"in success alone {points(gain)} over {baseline}, between {points(low)} and {points(high)}"
-    )
+    gain = points(mean_gain(differences))
+    return f"in success alone {gain} over {baseline}, between {points(low)} and {points(high)}"
 
 
 def inside_envelope(evidence: Evidence, settings: StressSettings, candidate: str) -> Inside | None:
@@ -179,4 +177,4 @@ def least_gain(
     measured: float | None = e_value
     if inside and e_value >= 1.0 / settings.alpha and not inside.shown:
         measured = inside.e_value if inside.worse else None
-    return Least(e_value, baseline, float(differences[baseline].mean()), inside, measured)
+    return Least(e_value, baseline, mean_gain(differences[baseline]), inside, measured)

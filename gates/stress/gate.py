@@ -20,7 +20,7 @@ from gates.stress.gains import by_condition, in_success, inside_envelope, least_
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
-from gates.stress.utility import utilities
+from gates.stress.utility import mean_worth
 from gates.stress.visited import visited_said
 from gates.stress.weights import listed
 from gates.words import points
@@ -74,10 +74,7 @@ def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
         MissingEvidenceError: A baseline was not run under every condition, as often as planned.
     """
     rows = {method: rollouts(evidence, settings, method) for method in settings.baselines}
-    means = {
-        method: float(utilities(evidence, settings, method, of).mean())
-        for method, of in rows.items()
-    }
+    means = {method: mean_worth(evidence, settings, method, of) for method, of in rows.items()}
     return max(means, key=lambda name: means[name])  # of equals the one that is named first
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from gates.bounds import share_interval
+from gates.bounds import mean_gain, share_interval
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
 from gates.recount import is_one
 from gates.stress.rollouts import DRILL, STRESS, StressSettings, rollouts
@@ -116,10 +116,10 @@ def coverage(
         starts=len(common),
         own=float(own.loc[common, "covered"].mean()),
         other=float(other.loc[common, "covered"].mean()),
-        gain=round(float(pairs.mean()), 12) + 0.0,
+        gain=mean_gain(pairs),
         interval=gain_interval(pairs, alpha=1.0 - settings.confidence),
         both=len(entered),
-        gain_of_both=round(float(of_both.mean()), 12) + 0.0 if len(entered) else None,
+        gain_of_both=mean_gain(of_both.to_numpy(np.float64)) if len(entered) else None,
     )
 
 

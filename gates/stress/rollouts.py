@@ -10,11 +10,11 @@ from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.recount import Subset, is_one
+from gates.recount import Subset, Term, is_one, part_said, part_share
 from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
 from gates.stress.weights import Weights, explained, require_weights
-from gates.words import percent, share_of
+from gates.words import percent
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
@@ -186,15 +186,16 @@ def _require_as_it_ended(rows: pd.DataFrame, method: str) -> None:
         )
 
 
-def within(table: str, condition: str) -> Subset:
-    """Rows of one condition."""
-    return Subset(table, (is_one("perturbation", condition),))
+def within(table: str, condition: str, *terms: Term) -> Subset:
+    """Rows of one condition, of which more may have to hold."""
+    return Subset(table, (is_one("perturbation", condition), *terms))
 
 
 def in_every_condition(
     rows: pd.DataFrame,
+    of: Subset,
     conditions: Sequence[str],
-    measure: Callable[[pd.DataFrame, str], tuple[Interval, Recount]],
+    measure: Callable[[pd.DataFrame, Subset, str], tuple[Interval, Recount]],
     said: Callable[[float], str],
 ) -> Measured:
     """An upper bound that must hold in each of some conditions: that of the worst one.
@@ -204,15 +205,17 @@ def in_every_condition(
 
     Args:
         rows: Rollouts, or invocations, of one method.
+        of: Their table, and which of them count in any condition.
         conditions: Where it must hold.
-        measure: Point and ends of the interval in one condition, from its rows and its name, and
-            what they are counted from.
+        measure: Point and ends of the interval in one condition, and what they are counted from;
+            given its rows, by what they were taken, and its name.
         said: Such a number as a reader reads it.
     """
     found = []
     for condition in conditions:
-        part = rows[rows["perturbation"] == condition]
-        (point, lower, upper), recount = measure(part, condition)
+        subset = within(of.table, condition, *of.terms)
+        part = subset.of(rows)
+        (point, lower, upper), recount = measure(part, subset, condition)
         found.append((upper, lower, point, condition, part["start"].nunique(), recount))
     upper, lower, point, condition, starts, recount = max(found, key=lambda one: one[:4])
     others = ", ".join(f"{one[3]} {said(one[0])}" for one in found if one[3] != condition)
@@ -226,7 +229,7 @@ def _counted(point: float, recount: Recount, said: Callable[[float], str]) -> st
     if recount.part is None:
         return said(point)
     units = recount.of.replace("_", " ") or "rollouts"
-    return share_of(recount.part, recount.whole, units)
+    return part_said(recount, units)
 
 
 def success_lower(
@@ -251,7 +254,7 @@ def success_lower(
         recount = subset.counted(part, SUCCEEDED)
         found.append((lower, upper, condition, part["start"].nunique(), recount))
     lower, upper, condition, starts, recount = min(found, key=lambda one: one[:3])
-    share = share_of(recount.part or 0.0, recount.whole, "rollouts")
+    share = part_said(recount, "rollouts")
     text = f"{condition}: {share} succeed; at least {percent(lower)}, by {starts} starts"
     counted = f"{starts} starts"
     return Measured(
@@ -260,5 +263,5 @@ def success_lower(
         text,
         counted=counted,
         recount=recount,
-        point=(recount.part or 0.0) / recount.whole,
+        point=part_share(recount),
     )

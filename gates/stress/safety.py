@@ -8,10 +8,10 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.arrivals import at_the_stub, require_played
 from gates.feasibility.proof import checked_violations
-from gates.recount import Subset
+from gates.recount import Subset, part_said
 from gates.stress.recoveries import RECOVERED, RECOVERIES, recoveries
 from gates.stress.rollouts import JOURNALS, STRESS, StressSettings, within
-from gates.words import percent, share_of
+from gates.words import percent
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
 
 STUB = f"{STRESS}/stub.parquet"
@@ -52,7 +52,7 @@ def recovery_success_lower(
         )
         bound, end = (lower, "at worst") if enough else (upper, "at best")
         recount = within(RECOVERIES, str(condition)).counted(part, RECOVERED)
-        share = share_of(recount.part or 0.0, recount.whole, "recoveries")
+        share = part_said(recount, "recoveries")
         text = f"worst in {condition}: {share} on {starts} starts, {end} {percent(bound)}"
         if enough or bound < least:
             counted = f"{starts} starts"

@@ -54,6 +54,17 @@ def utilities(
     return worth
 
 
+def mean_worth(
+    evidence: Evidence, settings: StressSettings, method: str, rows: pd.DataFrame
+) -> float:
+    """What the rollouts of a method are worth on average; by this the best simple one is named.
+
+    Raises:
+        MissingEvidenceError: As `utilities`.
+    """
+    return float(utilities(evidence, settings, method, rows).mean())
+
+
 def _seconds(
     evidence: Evidence, settings: StressSettings, method: str, rows: pd.DataFrame, cost: str
 ) -> Array:

@@ -4,7 +4,17 @@ import pandas as pd
 import pytest
 
 from gates.evidence import MissingEvidenceError
-from gates.recount import AtLeast, Differs, NotAll, Subset, all_hold, is_none, is_one
+from gates.recount import (
+    AtLeast,
+    Differs,
+    NotAll,
+    Subset,
+    all_hold,
+    is_none,
+    is_one,
+    part_said,
+    part_share,
+)
 
 FRAME = pd.DataFrame(
     {
@@ -64,6 +74,16 @@ def test_sums_are_those_of_the_columns():
     found = subset.summed(subset.of(FRAME), ("valid",), "samples")
     assert (found.part, found.whole, found.of, found.summed) == (11.0, 16.0, "samples", ("valid",))
     assert (found.where, found.columns) == ((), ("valid", "samples"))
+
+
+def test_a_share_is_of_what_was_counted_and_of_rows_alone_there_is_none():
+    subset = Subset("a.parquet")
+    found = subset.counted(FRAME, AtLeast("valid", 3))
+    assert (part_share(found), part_said(found, "rows")) == (0.75, "75 % (3 of 4 rows)")
+    assert part_said(subset.counted(FRAME, AtLeast("valid", 9)), "") == "0 % (none of 4)"
+    for ask in (part_share, lambda rows: part_said(rows, "rows")):
+        with pytest.raises(AssertionError, match="rows alone"):
+            ask(subset.counted(FRAME))
 
 
 def test_of_several_methods_no_one_is_named():

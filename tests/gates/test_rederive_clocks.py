@@ -188,7 +188,7 @@ def test_a_damaged_journal_is_bad_input(root):
 def test_gate_d_asks_for_it(root, monkeypatch):
     asked = []
     monkeypatch.setattr(module, "rederive_clocks", lambda *given: asked.append(given))
-    for name in ("_check", "_tables", "rederive_sessions", "rederive_latency",
+    for name in ("rederive_checked", "_tables", "rederive_sessions", "rederive_latency",
                  "rederive_disturbance", "rederive_rollout_draws", "rederive_distilled",
                  "_envelope", "_power", "rederive_trainings"):  # fmt: skip
         monkeypatch.setattr(module, name, lambda *given: None)

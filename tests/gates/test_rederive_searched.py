@@ -14,10 +14,16 @@ from gates.card.searched import FAILURE_SEARCH, SEARCHED
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.documents.failures import FAILURE
 from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.failure_search.tables import events_sha256
 from genpolicy.evidence.rows.failures import SearchedRow
+from genpolicy.evidence.shadow.tables import checked
+from genpolicy.execution.journal import Journal, read_journal, write_journal
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.rows import read_rows, write_rows
+from genpolicy.verification.checker import check_journal
+
+OTHER = "f" * 64
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +40,7 @@ def written(fleet, dataset, kit, tmp_path_factory):
     root = tmp_path_factory.mktemp("ladder")
     bench = make_bench(fleet, dataset, kit, tmp_path_factory.mktemp("made"))
     write_searched(root / FAILURE_SEARCH, bench, kit)
+    shutil.copytree(fleet[0] / "flow", root / "artifacts" / "train_generators" / "flow")
     return root, bench.watched[0].sha256
 
 
@@ -54,6 +61,29 @@ def change(root, how):
 
 def prove(root, params):
     module.rederive_searched(root, params, rederive._held_to(params))
+
+
+def plant(root, params, edit):
+    """Write journals of other events, and everything else as if they had happened."""
+    folder = root / FAILURE_SEARCH
+    paths = sorted((folder / "journals").glob("*.mcap"))
+    for path in paths:
+        sessions = []
+        for name, events in read_journal(path).items():
+            sessions.append(Journal(name))
+            for kind, time_ns, payload in edit([(e.kind, e.t, e.payload) for e in events]):
+                sessions[-1].add(kind, time_ns, payload)
+        write_journal(path, sessions)
+        for name, events in read_journal(path).items():
+            failure = folder / "failures" / f"{name}.json".replace("/", "__")
+            if failure.is_file():
+                stated = FAILURE.parse(read_json(failure), where=name)
+                other = replace(stated, events_sha256=events_sha256(events))
+                write_bytes(failure, canonical_json(FAILURE.plain(other)))
+    held_to = rederive._held_to(params)
+    (folder / CHECKER.file).unlink()
+    found = {path.name: check_journal(path, *held_to).as_document() for path in paths}
+    CHECKER.write(folder, checked(found))
 
 
 def refused(root, params, match):
@@ -80,6 +110,8 @@ def test_nothing_written_is_nothing_to_prove(tmp_path, params):
         (lambda r: [replace(r, outcome="other")], "outcome"),
         (lambda r: [replace(r, worth=0.9)], "worth"),
         (lambda r: [replace(r, point=(0.5, *r.point[1:]))], "point"),
+        (lambda r: [replace(r, point=r.point[:-1])], "point is .* which the search asks for"),
+        (lambda r: [replace(r, point=())], "point is .* which the search asks for"),
         (lambda r: [replace(r, scene_start="{}")], "scene_start"),
         (lambda r: [replace(r, start_sha256="0" * 64)], "start_sha256"),
         (lambda r: [replace(r, severity=0.01)], "severity"),
@@ -113,6 +145,43 @@ def test_another_checkpoint_than_gate_b_pinned_is_refused(root, params, monkeypa
     pinned = {"flow": SimpleNamespace(checkpoint="0" * 64)}
     monkeypatch.setattr(module, "CANDIDATES", SimpleNamespace(read=lambda _: pinned))
     refused(root, params, "as Gate B pinned it")
+
+
+def by_another_sampler(events):
+    return [(k, t, p | {"sampler": OTHER} if "sampler" in p else p) for k, t, p in events]
+
+
+def by_another_maker_at_the_end(events):
+    time_ns = events[-1][1]
+    return [*events[:-1], ("active", time_ns, {"checkpoint": OTHER, "sampler": OTHER}), events[-1]]
+
+
+def by_nobody(events):
+    return [event for event in events if event[0] != "active"]
+
+
+@pytest.mark.parametrize(
+    ("edit", "match"),
+    [
+        (by_another_sampler, r"flow/\w+@search/\d+: made by is"),
+        (by_another_maker_at_the_end, f"made by is {OTHER}"),
+        (by_nobody, "made by is nobody"),
+    ],
+)
+def test_rollouts_that_another_maker_made_are_refused(root, params, edit, match):
+    """As everywhere: weights and sampler, and whoever was in force on the way."""
+    plant(root, params, edit)
+    refused(root, params, match)
+
+
+def test_a_journal_that_is_written_again_as_it_was_is_proved(root, params):
+    plant(root, params, lambda events: events)
+    prove(root, params)
+
+
+def test_weights_that_lie_there_no_longer_are_refused(root, params):
+    shutil.rmtree(root / "artifacts" / "train_generators")
+    refused(root, params, "made by is")
 
 
 def test_another_finding_of_the_checker_is_refused(root, params):

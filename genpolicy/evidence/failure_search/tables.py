@@ -19,7 +19,7 @@ from genpolicy.evidence.failure_search.rollouts import (
     run_asked,
     run_search,
 )
-from genpolicy.evidence.rows.failures import SearchedRow
+from genpolicy.evidence.rows.failures import FAILURES, SearchedRow, failure_name
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.shadow.tables import checker_document
 from genpolicy.evidence.stress.latency import LatencyModel
@@ -33,8 +33,8 @@ from genpolicy.integrity.rows import write_rows
 from genpolicy.tasks.api import load_task
 
 SEARCHED_TABLE, ROLLOUTS = "searched.parquet", "rollouts.parquet"
-FAILURES, JOURNALS = "failures", "journals"
-"""Folders below that of the stage: a file of each failure, and what happened in all rollouts."""
+JOURNALS = "journals"
+"""Folder below that of the stage: what happened in all rollouts."""
 
 
 def plan_searches(
@@ -106,11 +106,6 @@ def write_searches(
     journals = [searching.shard.journal for searching in searches]
     checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
     CHECKER.write(folder, checked)
-
-
-def failure_name(row: SearchedRow) -> str:
-    """Name of the file of a failure."""
-    return f"{row.method}__{row.perturbation}__{row.start}.json"
 
 
 def failure_of(searching: Searching, row: SearchedRow, journal: Journal) -> Failure:

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+FAILURES = "failures"
+"""Folder below that of the stage, with a file of each failure."""
+
 
 @dataclass(frozen=True)
 class SearchedRow:
@@ -40,3 +43,8 @@ class SearchedRow:
     outcome: str
     failed: bool
     worth: float
+
+
+def failure_name(row: SearchedRow) -> str:
+    """Name of the file of a failure."""
+    return f"{row.method}__{row.perturbation}__{row.start}.json"

@@ -9,15 +9,13 @@ from genpolicy.errors import BadInputError
 from genpolicy.evidence.documents.failures import FAILURE
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.failure_search.tables import (
-    FAILURES,
     ROLLOUTS,
     SEARCHED_TABLE,
-    failure_name,
     run_again,
     search_of,
     write_searches,
 )
-from genpolicy.evidence.rows.failures import SearchedRow
+from genpolicy.evidence.rows.failures import FAILURES, SearchedRow, failure_name
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.execution.journal import read_journal

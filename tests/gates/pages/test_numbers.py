@@ -137,6 +137,7 @@ def recount(**changes):
          "a = 1 and b = x: ticks adds up to 1,234, held adds up to 12"),
         ({"of": "ticks", "summed": ("held", "late"), "part": 12.0},
          "a = 1 and b = x: ticks adds up to 1,234, held and late add up to 12"),
+        ({"of": "ticks"}, "a = 1 and b = x: ticks adds up to 1,234"),
         ({"hits": ("c = " + " or ".join("abcdefgh"),), "part": 3.0},
          "a = 1 and b = x: 1,234 rows, of them c = a or 7 others that criteria.csv lists in 3"),
     ],

@@ -7,7 +7,8 @@ from asked import asked, found_in, settings_of
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
-from gates.stress.gains import by_condition, inside_envelope
+from gates.stress.choice import compared
+from gates.stress.gains import by_condition, inside_envelope, inside_pairs, least_gain
 from gates.stress.gate import promotion_e_value
 from gates.stress.pairs import paired_by_condition
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
@@ -71,6 +72,16 @@ def test_the_gain_inside_the_envelope_is_that_over_the_hardest_baseline_there(la
     assert found.e_value == test.e_value >= 1 / alpha
     assert found.interval == gain_interval(pairs["envelope"], alpha=alpha)
     assert 0 < found.interval[0] < found.gain < found.interval[1]
+
+
+def test_a_gain_that_is_nothing_is_said_as_nothing(ladder):
+    """Means of binary fractions that cancel leave 1e-17, which in points were a power of ten."""
+    plan, pairs = settings_of(ladder, "D"), np.array([-0.1, -0.2, 0.3])
+    assert pairs.mean() != 0.0
+    inside = inside_pairs({"bc": pairs}, plan)
+    assert str(inside).startswith("inside the envelope +0 points of success over bc")
+    assert least_gain({"bc": pairs}, None, plan).gain == 0.0
+    assert compared("flow", "act", pairs, plan).gain == 0.0
 
 
 def test_what_is_gained_outside_the_envelope_alone_is_no_promotion(ladder):

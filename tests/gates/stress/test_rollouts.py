@@ -9,6 +9,7 @@ from editing import cells
 from pydantic import ValidationError
 
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.recount import AtLeast, Subset
 from gates.stress.rollouts import (
     SUCCESS,
     StressSettings,
@@ -129,15 +130,30 @@ def test_the_highest_bound_of_all_conditions_is_judged_and_the_others_are_said()
         {"perturbation": ["calm", *3 * ["storm"]], "start": [0, 0, 1, 1], "value": [1.0, 2, 3, 2.5]}
     )
 
-    def measure(part, condition):
+    def measure(part, subset, condition):
+        assert subset == within("rollouts", condition)
         interval = part["value"].mean(), 0.0, part["value"].max()
-        return interval, within("rollouts", condition).counted(part)
+        return interval, subset.counted(part)
 
-    found = in_every_condition(rows, ("calm", "storm"), measure, "{:g} N".format)
+    of = Subset("rollouts")
+    found = in_every_condition(rows, of, ("calm", "storm"), measure, "{:g} N".format)
     assert (found.value, found.interval) == (3.0, (0.0, 3.0))
     assert found.caveat == "worst in storm: 2.5 N, at most 3 N; at most in the others: calm 1 N"
     assert found.counted == "2 starts"
     assert found.recount.where == ("perturbation = storm",) and found.recount.whole == 3.0
+
+
+def test_what_counts_in_a_condition_is_what_its_recount_says():
+    rows = pd.DataFrame({"perturbation": 3 * ["calm"], "start": [0, 1, 2], "value": [0.0, 2, 3]})
+
+    def measure(part, subset, condition):
+        return (part["value"].mean(), 0.0, part["value"].max()), subset.counted(part)
+
+    of = Subset("rollouts", (AtLeast("value", 2),))
+    found = in_every_condition(rows, of, ("calm",), measure, "{:g} N".format)
+    assert (found.point, found.counted) == (2.5, "2 starts")
+    assert found.recount.where == ("perturbation = calm", "value >= 2")
+    assert found.recount.whole == 2.0
 
 
 def test_the_undisturbed_condition_alone_is_no_comparison(ladder):

@@ -14,7 +14,7 @@ from gates.report import read_report
 from gates.stress.gate import best_baseline
 from gates.stress.pairs import paired_by_condition, paired_differences
 from gates.stress.rollouts import rollouts
-from gates.stress.utility import utilities
+from gates.stress.utility import mean_worth, utilities
 from gates.stress.weights import LEAST_OF_A_SUCCESS
 from gates.words import points
 from genpolicy.seeds import stream
@@ -29,6 +29,12 @@ def of(root, method, utility):
     plan = settings_of(root, "D").model_copy(update={"utility": utility})
     rows = rollouts(Evidence(root), plan, method)
     return rows, utilities(Evidence(root), plan, method, rows)
+
+
+def test_the_mean_worth_is_that_of_the_rollouts(ladder):
+    plan = settings_of(ladder, "D").model_copy(update={"utility": SLOW})
+    rows, worth = of(ladder, "flow", SLOW)
+    assert mean_worth(Evidence(ladder), plan, "flow", rows) == worth.mean() < 1.0
 
 
 def as_json(utility):
