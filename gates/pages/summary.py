@@ -5,6 +5,7 @@ Numbers are those of the HTML page, by the same functions: all digits stand in t
 
 import re
 
+from gates.doubt import texts_once
 from gates.overrides import OVERRIDDEN, said
 from gates.pages.numbers import between, human, judged_at, limit_said, rests_on
 from gates.pages.table import deciding, not_asked, overridden, passed_by, stops, tally, waived
@@ -44,7 +45,8 @@ def markdown(report: GateReport) -> str:
     rows = [_row(criterion, report) for criterion in report.criteria]
     lines += [f"<details><summary>All {len(rows)} criteria</summary>", "", *HEAD, *rows, ""]
     lines += ["</details>", "", "## Caveats", ""]
-    lines += [f"- {plain(caveat)}" for caveat in report.caveats]
+    caveats = texts_once(report.caveats, report.candidates)
+    lines += [f"- {plain(caveat)}" for caveat in caveats]
     page = report_path(report.gate).removesuffix(".json")
     lines += ["", f"Figures: `{page}.html`. All numbers: `{page}.json`. Proof: `{PROOF}`."]
     return "\n".join(lines) + "\n"
