@@ -175,19 +175,24 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
 @gates.command(epilog=examples("genpolicy gates show C"))
 def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
     """Print one report as it lies there, not proved."""
+    from gates.overview import painted
+    from gates.printed import coloured
     from gates.report import limit_text, measured_text, read_report
 
     report, digest = read_report(root, _gate(letter))
     if as_json:
         print(report.model_dump_json(indent=2))
         return 0
-    print(f"Gate {report.gate}: {report.verdict}  (report {digest[:12]}, not proved)")
+    colour = coloured()
+    verdict = painted(report.verdict, wide=0, colour=colour)
+    print(f"Gate {report.gate}: {verdict}  (report {digest[:12]}, not proved)")
     print(f"Decision: {report.decision}")
     if report.diagnosis:
         print(f"Diagnosis: {report.diagnosis}")
     for c in report.criteria:
         name = f"{c.id} ({c.candidate})" if c.candidate else c.id
-        print(f"  {c.verdict:<14} {name}: {measured_text(c)}, required {limit_text(c)}")
+        verdict = painted(c.verdict, wide=14, colour=colour)
+        print(f"  {verdict} {name}: {measured_text(c)}, required {limit_text(c)}")
     return 0
 
 
@@ -223,6 +228,8 @@ def verify_card(
 
     Where it would pass, all is asked that `card sign` asks before a signature.
     """
+    from gates.overview import painted
+    from gates.printed import coloured
     from gates.proof import judge
 
     report = judge(root, "E", today=_day(today) if today else None)
@@ -231,9 +238,11 @@ def verify_card(
     if as_json:
         print(report.model_dump_json(indent=2))
     else:
-        print(f"{report.verdict}: {report.decision}")
+        colour = coloured()
+        print(f"{painted(report.verdict, wide=0, colour=colour)}: {report.decision}")
         for c in report.criteria:
-            print(f"  {c.verdict:<14} {c.id}: {'; '.join(filter(None, (c.counted, c.caveat)))}")
+            verdict = painted(c.verdict, wide=14, colour=colour)
+            print(f"  {verdict} {c.id}: {'; '.join(filter(None, (c.counted, c.caveat)))}")
     return 0 if report.verdict == "PASS" else 3
 
 

@@ -1,12 +1,14 @@
 """One reason why a verdict may be wrong, and the words that all rules share."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from gates.report import Answer, GateReport
 
 MOST_NAMED = 3
 """Criteria that one doubt names; of more it says how many there are."""
+GAP = "\0"
+"""In place of a name; no sentence holds one."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,7 @@ class Doubt:
         text: What is the matter, for a person.
         criteria: Criteria that it is about, by name; empty for a caveat of the whole gate.
         candidate: Whose criterion it is; empty where it is one of the whole gate, or several.
+        also: Other gates of whose evidence the very same is said.
     """
 
     gate: str
@@ -26,6 +29,7 @@ class Doubt:
     text: str
     criteria: tuple[str, ...] = ()
     candidate: str = ""
+    also: tuple[str, ...] = ()
 
 
 def about(report: GateReport, kind: str, answer: Answer, more: str = "") -> Doubt:
@@ -57,3 +61,48 @@ def sentence(text: str) -> str:
     first = text.partition(" ")[0]
     head = text[:1] if "_" in first or first.endswith(":") else text[:1].upper()
     return head + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def said_once(doubts: Iterable[Doubt], names: Collection[str]) -> list[Doubt]:
+    """Doubts that differ by the name of a candidate alone as one with all names, at the first.
+
+    The very same words about several gates are one as well, with all gates.
+
+    Args:
+        doubts: In the order in which they are said.
+        names: Of candidates.
+    """
+    found: dict[tuple[str, str, str], list[tuple[str, Doubt]]] = {}
+    for doubt in doubts:
+        name, rest = _apart(doubt.text, names)
+        found.setdefault((doubt.gate if name else "", doubt.kind, rest), []).append((name, doubt))
+    return [_together(own, rest) for (_, _, rest), own in found.items()]
+
+
+def texts_once(texts: Iterable[str], names: Collection[str]) -> list[str]:
+    """The same of sentences without a kind: caveats of one gate."""
+    return [one.text for one in said_once((Doubt("", "", text) for text in texts), names)]
+
+
+def _apart(text: str, names: Collection[str]) -> tuple[str, str]:
+    """The candidate that a sentence is about, and the sentence with a gap in its place.
+
+    It stands at the head before a colon, or in brackets behind the question.
+    """
+    for name in names:
+        if text.startswith(f"{name}: "):
+            return name, GAP + text.removeprefix(name)
+        head, found, tail = text.partition(f"? ({name}) ")
+        if found:
+            return name, f"{head}? ({GAP}) {tail}"
+    return "", text
+
+
+def _together(own: Sequence[tuple[str, Doubt]], rest: str) -> Doubt:
+    first = own[0][1]
+    names = list(dict.fromkeys(name for name, _ in own if name))
+    gates = tuple(dict.fromkeys(doubt.gate for _, doubt in own))
+    if len(names) < 2:
+        return replace(first, also=gates[1:])
+    all_names = f"{', '.join(names[:-1])} and {names[-1]}"
+    return replace(first, text=rest.replace(GAP, all_names, 1), candidate="")

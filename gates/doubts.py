@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from gates.closeness import BY_CHANCE, by_room, closeness
-from gates.doubt import MOST_NAMED, Doubt, about, named
+from gates.doubt import MOST_NAMED, Doubt, about, named, said_once
 from gates.doubts_of_evidence import (
     an_average,
     cold_start,
@@ -56,7 +56,8 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
     """Doubts about all gates: what a reader weighs one by one, and what no gate shows.
 
     The gravest kind first, whatever its gate. What several gates say is said once: a rehearsal and
-    moved limits by the gate that names most of them, which hold for those below it too.
+    moved limits by the gate that names most of them, which hold for those below it too. So is
+    what holds of several candidates alike.
 
     Returns:
         The first are few, and begin with what is overridden, rehearsal, moved limits, what was
@@ -83,9 +84,10 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
     waived = [replace(doubt, kind="not asked") for doubt in others if WAIVED.match(doubt.text)]
     overridden = [replace(doubt, kind="overridden") for doubt in others if is_said(doubt.text)]
     said = {doubt.text for doubt in (*waived, *clocks, *overridden)}
-    return overridden + first + waived + clocks + weighed, [
-        one for one in others if one.text not in said
-    ]
+    names = list(dict.fromkeys(name for report in every for name in report.candidates))
+    weighed = overridden + first + waived + clocks + weighed
+    rest = (one for one in others if one.text not in said)
+    return said_once(weighed, names), said_once(rest, names)
 
 
 def for_a_card(report: GateReport, candidate: str) -> list[str]:

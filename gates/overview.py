@@ -108,9 +108,7 @@ def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) 
     for line in lines:
         time = "" if line.seconds is None else f"{line.seconds:.1f} s"
         memory = "" if line.peak_mib is None else f"{line.peak_mib} MiB"
-        verdict = f"{line.verdict:<15}"
-        if colour and line.verdict in COLOURS:
-            verdict = typer.style(verdict, fg=COLOURS[line.verdict])
+        verdict = painted(line.verdict, wide=15, colour=colour)
         text = f"{line.stage:<{wide}} {verdict} {time:>8} {memory:>8}"
         said = [said for said in (line.decided_by, *line.stopped) if said]
         if terminal:
@@ -122,6 +120,13 @@ def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) 
     total = sum(line.seconds for line in lines if line.seconds is not None)
     rows.append(f"{'':<{wide}} {'':<15} {total:>6.1f} s")
     return "\n".join(rows)
+
+
+def painted(verdict: str, *, wide: int, colour: bool) -> str:
+    """A verdict, or how a stage ended, in its colour where there is colour, and filled up."""
+    text = f"{verdict:<{wide}}"
+    known = colour and verdict in COLOURS
+    return typer.style(text, fg=COLOURS[verdict]) if known else text
 
 
 def red(text: str, *, colour: bool) -> str:

@@ -13,7 +13,7 @@ from gates.card.people import load_allow_list
 from gates.for_ci import as_github, as_junit, beside, cases
 from gates.overriders import require_in_force
 from gates.overrides import OVERRIDES, apart
-from gates.overview import red
+from gates.overview import painted, red
 from gates.proof import Rung
 from gates.report import GATES, Gate, read_report, report_path, stage_of
 from gates.writing import INDEX, changed_page
@@ -133,7 +133,8 @@ def print_rungs(rungs: Sequence[Rung], as_json: bool) -> None:
         return
     wide = max(len(rung.name) for rung in rungs)
     for rung in rungs:
-        name = f"{rung.gate}  {rung.name:<{wide}}  {rung.verdict:<14}"
+        verdict = painted(rung.verdict, wide=14, colour=coloured())
+        name = f"{rung.gate}  {rung.name:<{wide}}  {verdict}"
         decision, overridden = apart(rung.note)
         said = [rung.decided_by or decision]
         said += [red(overridden, colour=coloured())] if overridden else []

@@ -14,6 +14,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from gates.doubt import texts_once
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.overrides import said
 from gates.pages import (
@@ -138,6 +139,7 @@ def gate_page(root: Path, report: GateReport, *, rows: Rows | None = None) -> st
         columns=columns(report),
         reading=READING[report.gate],
         words=words(report.gate),
+        caveats=texts_once(report.caveats, report.candidates),
         pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
         identities=identities(Evidence(root), report),
         card=card,

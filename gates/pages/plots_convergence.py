@@ -87,7 +87,7 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
         raise MissingEvidenceError("validation.parquet of every training is missing")
     names = [training.method for training in found]
     colour, dash = colours(names), dashes(names)
-    figure, (curves, falls) = new_figure(height=1.6 + 0.24 * len(found), columns=2)
+    figure, (curves, falls) = new_figure(height=1.9 + 0.24 * len(found), columns=2)
     for place, training in enumerate(found):
         look = {"color": colour[training.method], "ls": dash[training.method]}
         curves.plot(training.after, training.loss, **look)
@@ -108,6 +108,10 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     falls.axvline(0.0, color=GREY, lw=0.8)
     falls.set_xlabel(f"fall, share, {report.settings['confidence']:.0%} interval")
     draw_limit(falls, report, LIMIT)
+    # The names at the right stand at rows of another panel, which says nothing of these curves.
+    for name in in_order(names):
+        curves.plot([], [], color=colour[name], ls=dash[name], label=name)
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 

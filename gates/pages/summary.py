@@ -1,18 +1,22 @@
-"""Markdown summary of a report, fit for a pull request; names cannot break out of the table."""
+"""Markdown summary of a report, fit for a pull request; names cannot break out of the table.
+
+Numbers are those of the HTML page, by the same functions: all digits stand in the JSON report.
+"""
 
 import re
 
+from gates.doubt import texts_once
 from gates.overrides import OVERRIDDEN, said
-from gates.pages.guide import unit
-from gates.pages.table import deciding, not_asked, overridden, passed_by, sign, stops, tally, waived
-from gates.report import NAMES, Answer, GateReport, limit_text, measured_text, report_path
+from gates.pages.numbers import between, human, judged_at, limit_said, rests_on
+from gates.pages.table import deciding, not_asked, overridden, passed_by, stops, tally, waived
+from gates.report import NAMES, Answer, GateReport, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
 PROOF = "python -m gates verify"
 MARKS = {"PASS": "✓", "FAIL": "✕", "INCONCLUSIVE": "?", "PENDING_REVIEW": "…"}
 HEAD = (
-    "| verdict | criterion | candidate | measured | interval | required | owner |",
-    "|---|---|---|---|---|---|---|",
+    "| verdict | criterion | candidate | measured | rests on | judged at | required | owner |",
+    "|---|---|---|---|---|---|---|---|",
 )
 
 
@@ -41,7 +45,8 @@ def markdown(report: GateReport) -> str:
     rows = [_row(criterion, report) for criterion in report.criteria]
     lines += [f"<details><summary>All {len(rows)} criteria</summary>", "", *HEAD, *rows, ""]
     lines += ["</details>", "", "## Caveats", ""]
-    lines += [f"- {plain(caveat)}" for caveat in report.caveats]
+    caveats = texts_once(report.caveats, report.candidates)
+    lines += [f"- {plain(caveat)}" for caveat in caveats]
     page = report_path(report.gate).removesuffix(".json")
     lines += ["", f"Figures: `{page}.html`. All numbers: `{page}.json`. Proof: `{PROOF}`."]
     return "\n".join(lines) + "\n"
@@ -60,18 +65,18 @@ def _candidates(report: GateReport) -> list[str]:
 
 
 def _row(c: Answer, report: GateReport) -> str:
-    interval = f"{c.interval[0]:.6g} to {c.interval[1]:.6g}" if c.interval else ""
-    after = f" {unit(c.id)}" if unit(c.id) else ""
-    measured = f"{c.measured:.6g}{after}" if c.measured is not None else measured_text(c)
+    pending = c.verdict == "PENDING_REVIEW" and c.measured is None
+    where = judged_at(c)
     aside = waived(c, report) or overridden(c, report)
     note = f" ({aside})" if aside else ""
     cells = (
         f"{MARKS[c.verdict]} {c.verdict.replace('_', ' ')}{note}",
         c.id,
         c.candidate or "",
-        measured,
-        interval,
-        f"{sign(limit_text(c))}{after}",
+        "pending review" if pending else human(c, c.measured),
+        rests_on(c.counted),
+        f"{where} of {between(c)}" if where and c.interval else where,
+        limit_said(c) if c.threshold is not None else "a limit in params.yaml",
         c.owner or "nobody",
     )
     return "| " + " | ".join(plain(cell) for cell in cells) + " |"

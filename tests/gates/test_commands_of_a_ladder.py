@@ -166,6 +166,28 @@ def test_show_and_judge(ladder, _run):
     assert shown.exit_code == 0 and json.loads(shown.output)["gate"] == "A"
 
 
+@pytest.mark.parametrize("verdict", ["PASS", "FAIL", "INCONCLUSIVE", "PENDING_REVIEW"])
+@pytest.mark.parametrize("gate", "AE")
+def test_a_verdict_has_its_colour_whichever_gate_is_shown(
+    tmp_path, _run, monkeypatch, capsys, gate, verdict
+):
+    """Of Gate E as of the others: green passes, red does not, yellow waits or is not known."""
+    number = {"PASS": 32, "FAIL": 31}.get(verdict, 33)
+    answer = criterion(verdict, None, "nfe")
+    report = REPORT.model_copy(update={"gate": gate, "verdict": verdict, "criteria": (answer,)})
+    monkeypatch.setattr("gates.report.read_report", lambda root, gate: (report, "0123456789abcdef"))
+    monkeypatch.setattr("gates.proof.judge", lambda root, gate, today: report)
+    monkeypatch.setattr("gates.commands.require_beneath", lambda root: None)
+    monkeypatch.setattr("gates.printed.coloured", lambda: True)
+    shown = _run(tmp_path, "show", gate).output
+    assert shown.startswith(f"Gate {gate}: \x1b[{number}m{verdict}\x1b[0m  (report")
+    assert f"  \x1b[{number}m{verdict:<14}\x1b[0m nfe: " in shown
+    run_program(card, "card", ["verify", "--root", str(tmp_path)])
+    said = capsys.readouterr().out
+    assert said.startswith(f"\x1b[{number}m{verdict}\x1b[0m: ")
+    assert f"  \x1b[{number}m{verdict:<14}\x1b[0m nfe: " in said
+
+
 def test_judge_exits_0_on_fail(ladder, _run):
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     result = _run(ladder, "judge", "A")

@@ -1,5 +1,7 @@
 """What could make a verdict wrong: a planted weakness of each kind is named, and none invented."""
 
+import re
+
 import evidence
 import pytest
 from test_differences import REPORT
@@ -181,8 +183,22 @@ def test_the_gravest_kind_comes_first_whatever_its_gate(reports):
     found = [ranks.index(doubt.kind) for doubt in first]
     assert found == sorted(found) and len(set(found)) > 1
     assert {doubt.kind for doubt in rest} == {"not shown"}
-    weighed = [doubt.kind for doubt in first if doubt.kind not in ("not asked", "two clocks")]
-    assert sorted(weighed) == sorted(kind for kind in order if kind != "not shown")
+    weighed = {doubt.kind for doubt in first if doubt.kind not in ("not asked", "two clocks")}
+    assert weighed == {kind for kind in order if kind != "not shown"}
+
+
+def test_on_the_first_page_no_doubt_is_lost_and_none_is_said_twice(reports):
+    """Each kind of each gate stays, and of what holds of both candidates alike each name."""
+    first, rest = of_a_ladder(reports.values())
+    every = [doubt for report in reports.values() for doubt in doubts_of(report)]
+    kept = {(gate, doubt.kind) for doubt in first for gate in (doubt.gate, *doubt.also)}
+    assert {(d.gate, d.kind) for d in every if d.kind != "not shown"} <= kept
+    texts = [doubt.text for doubt in (*first, *rest)]
+    nameless = [re.sub(r"\b(diffusion|flow)\b( and flow)?", "X", text) for text in texts]
+    assert len(set(nameless)) == len(nameless) < len(every)
+    cold = [doubt for doubt in first if doubt.kind == "cold start"]
+    assert [(doubt.criteria, doubt.candidate) for doubt in cold] == [(("latency_p95_s",), "")]
+    assert "(diffusion and flow)" in cold[0].text
 
 
 def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):

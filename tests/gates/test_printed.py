@@ -76,6 +76,18 @@ def test_a_line_for_each_gate(capsys):
     ]
 
 
+def test_on_a_terminal_each_verdict_has_its_colour_and_the_columns_stay(monkeypatch, capsys):
+    monkeypatch.setattr(printed, "coloured", lambda: True)
+    waits = Rung("E", "card", "PENDING_REVIEW", "sign", "", "reports/gate_e.json", 3)
+    print_rungs([*RUNGS, waits], as_json=False)
+    assert capsys.readouterr().out.splitlines() == [
+        "A  need             \x1b[32mPASS          \x1b[0m  every byte",
+        "B  reproducibility  \x1b[31mFAIL          \x1b[0m  nfe: 5",
+        "E  card             NOT JUDGED",
+        "E  card             \x1b[33mPENDING_REVIEW\x1b[0m  sign",
+    ]
+
+
 @pytest.mark.parametrize("verdict", ["PASS", "FAIL"])
 def test_what_is_overridden_is_said_in_red_where_there_is_colour(monkeypatch, capsys, verdict):
     told = "OVERRIDDEN: nfe_mismatch of flow by rita; without, gate B FAIL."

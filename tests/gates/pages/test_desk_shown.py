@@ -12,7 +12,7 @@ from gates.card.commands import card
 from gates.pages import page
 from gates.writing import write_gate
 
-KEPT = {"gate", "verdict", "criteria", "candidate", "signed"}
+KEPT = {"gate", "also", "verdict", "criteria", "candidate", "signed"}
 """Fields that the page looks something up by: gates, verdicts, places of criteria."""
 SECTIONS = [
     "What could make this wrong", "How close to each limit", "Watch it", "What it costs",

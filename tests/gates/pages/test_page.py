@@ -14,9 +14,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
 from markup import Markup
 from team import PEOPLE, Team
 
-from gates.pages.page import index_page
+from gates.card.signing import read_draft
+from gates.doubt import texts_once
+from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
-from gates.report import report_path
+from gates.report import read_report, report_path
 from gates.writing import write_gate, write_index
 
 EVIL = '<script>alert("x")</script>'
@@ -47,7 +49,7 @@ def test_the_page_is_offline_small_and_whole(pages, gate):
     assert all(
         html.escape(c, quote=False) in html.unescape(text).replace("&", "&amp;")
         or c in html.unescape(text)
-        for c in report["caveats"]
+        for c in texts_once(report["caveats"], report["candidates"])
     )
     assert text.index(report["verdict"].replace("_", " ")) < text.index("<h2>Criteria</h2>")
 
@@ -103,7 +105,7 @@ def test_names_cannot_break_out_of_page_figure_or_table(ladder):
     lines = markdown(report).splitlines()
     assert not any("<script" in line or "@all" in line for line in lines)
     widths = {len(re.findall(r"(?<!\\)\|", line)) for line in lines if line.startswith("| ")}
-    assert widths == {8}
+    assert widths == {9}
 
 
 def test_markup_in_the_fields_of_a_signed_card_stays_text(ladder):
@@ -124,3 +126,20 @@ def test_a_missing_table_is_said_in_place_of_its_figure(ladder):
     report = write_gate(ladder, "A")
     assert report.verdict == "INCONCLUSIVE"
     assert "Not drawn: artifacts/audit/strata.parquet is missing." in _page(ladder, "A")
+
+
+def test_what_holds_of_two_candidates_alike_is_said_once_and_the_card_keeps_each(ladder):
+    """On the first page, on the gate's and in its summary; what is signed stays word for word."""
+    alike = "the card&#39;s box reaches up to 20 mm beyond what was visited"
+    report = read_report(ladder, "D")[0]
+    single = [f"{name}: {html.unescape(alike)}" for name in ("diffusion", "flow")]
+    assert all(any(c.startswith(text) for c in report.caveats) for text in single)
+    for page in (index_page(ladder), gate_page(ladder, report)):
+        assert page.count(alike) == 1 and f"diffusion and flow: {alike}" in page
+    assert markdown(report).count("beyond what was visited") == 1
+    caveats = read_draft(ladder).caveats
+    assert all(any(c.startswith(text) for c in caveats) for text in single)
+    seed = re.search(
+        "<li><b>one training seed</b>((?:(?!<li>).)*?)diffusion, flow: trained", index_page(ladder)
+    )
+    assert re.findall(r'<a href="gate_(.)\.html', seed[1]) == ["b", "d"]

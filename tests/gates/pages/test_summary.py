@@ -28,22 +28,51 @@ def _rows(lines: list[str]) -> list[list[str]]:
     return found
 
 
-def _numbers(text: str) -> list[float]:
-    return [float(word) for word in text.split() if re.fullmatch(r"[-+.e\d]+", word)]
+UNITS = {"ms": 1e-3, "mm": 1e-3, "%": 1e-2}
+SIGNS = {"<=": "≤ ", ">=": "≥ "}
 
 
-def _as_printed(*values: float | None) -> list[float]:
-    return [float(f"{value:.6g}") for value in values if value is not None]
+def _read(text: str) -> tuple[float, str]:
+    """A number as it is printed, in SI units, and its digits."""
+    found = re.fullmatch(r"×?(-?[\d,.]+(?:e[-+]\d+)?)(?: (.+))?", text)
+    assert found, text
+    return float(found[1].replace(",", "")) * UNITS.get(found[2], 1.0), found[1]
+
+
+def _is_printed(text: str, value: float) -> None:
+    """It is that number, to three digits that count unless it is whole."""
+    read, digits = _read(text)
+    assert read == pytest.approx(value, rel=0.0051, abs=1e-12)
+    counting = re.sub(r"e.*|[-,.]", "", digits).lstrip("0")
+    assert value == int(value) or len(counting) <= 3 or abs(read) >= 1000, text
 
 
 def _says_what_the_report_says(row: list[str], c) -> None:
-    verdict, name, candidate, measured, interval, required, owner = row
+    verdict, name, candidate, measured, counted, judged, required, owner = row
     assert verdict.split(" ", 1)[1].split(" (")[0] == c.verdict.replace("_", " ")
     assert (name, candidate, owner) == (c.id, c.candidate or "", c.owner or "nobody")
-    assert _numbers(measured) == _as_printed(c.measured)
-    assert _numbers(interval) == _as_printed(*(c.interval or ()))
-    assert _numbers(required) == _as_printed(c.threshold)
-    assert required[0] == {"<=": "≤", ">=": "≥"}[c.comparison] or c.threshold is None
+    if c.measured is None:
+        assert (measured, judged) == (
+            "pending review" if c.verdict == "PENDING_REVIEW" else "not measured",
+            "",
+        )
+    else:
+        _is_printed(measured, c.measured)
+        where, _, interval = judged.partition(" of ")
+        assert where in ("a point", "the worse end", "the better end", "a point of its interval")
+        assert (where == "a point") == (c.interval is None) == (interval == "")
+        low, high = interval.split(" to ") if interval and " to 1 to " not in interval else ("", "")
+        for text, end in zip((low, high), c.interval or (), strict=False):
+            unit = high.partition(" ")[2]
+            _is_printed(text if not unit or " " in text else f"{text} {unit}", end)
+    assert counted == re.sub(
+        r"\d{4,}", lambda n: f"{int(n[0]):,}", re.sub("^0 of ", "none of ", c.counted)
+    )
+    if c.threshold is None:
+        assert required == "a limit in params.yaml"
+    else:
+        assert required.startswith(SIGNS[c.comparison])
+        _is_printed(required[2:], c.threshold)
 
 
 def _holds_what_the_report_holds(report) -> None:
@@ -81,3 +110,19 @@ def test_the_summary_of_what_fails_and_what_is_missing_says_so(copied: Path):
         report = judge(copied, gate)
         assert {c.verdict for c in report.criteria} == verdicts
         _holds_what_the_report_holds(report)
+
+
+def test_a_number_is_the_same_on_the_page_and_in_the_summary(judged):
+    """Milliseconds, millimetres and percent are what both print."""
+    from gates.pages.numbers import human, limit_said
+
+    seen = set()
+    for gate in "ABCD":
+        report = judged(gate)
+        lines = markdown(report).splitlines()
+        cut = next(n for n, line in enumerate(lines) if line.startswith("<details>"))
+        for row, c in zip(_rows(lines[cut:]), report.criteria, strict=True):
+            if c.measured is not None:
+                assert row[3] == human(c, c.measured) and row[6] == limit_said(c)
+                seen.add(row[6].rpartition(" ")[2])
+    assert {"ms", "mm", "%"} <= seen

@@ -1,0 +1,99 @@
+"""Figures with several methods: whatever has the colour of one is beside its name.
+
+A name stands in a legend whose sample has that colour, or at the axis where a row, a column or a
+panel is the method's own.
+"""
+
+from collections.abc import Iterator
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from gates.evidence import Evidence
+from gates.pages.figures import METHODS, Plot, left_out
+from gates.pages.page import PLOTS
+from genpolicy.pages.figures.drawing import STYLE, svg
+
+NAMES = {colour.lower(): name for name, colour in METHODS.items()}
+CASES = [(gate, plot) for gate in "ABCD" for plot in PLOTS[gate] if isinstance(plot, Plot)]
+LEAST_SEVERAL = 8
+"""Figures of the whole evidence in which several methods are told apart by colour."""
+
+
+def _colours(artist: Artist) -> set[str]:
+    if isinstance(artist, Line2D):
+        return {to_hex(artist.get_color())}
+    if isinstance(artist, Patch):
+        return {to_hex(artist.get_facecolor()), to_hex(artist.get_edgecolor())}
+    if isinstance(artist, Collection):
+        return {to_hex(c) for c in (*artist.get_facecolor(), *artist.get_edgecolor())}
+    return set()
+
+
+def _methods(axes: Axes) -> set[str]:
+    """Methods whose colour something in the axes has that is drawn and not only a sample."""
+    drawn = (item for item in axes.get_children() if not isinstance(item, Legend))
+    found = set()
+    for item in drawn:
+        empty = isinstance(item, Line2D) and np.size(item.get_xdata()) == 0
+        if not empty:
+            found |= {NAMES[c] for c in _colours(item) if c in NAMES}
+    return found
+
+
+def _in_legends(figure: Figure) -> Iterator[tuple[str, str]]:
+    """Of each entry the method whose colour its sample has, and what stands beside it."""
+    own = [axes.get_legend() for axes in figure.axes]
+    for legend in [*figure.legends, *(one for one in own if one is not None)]:
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
+            for colour in _colours(handle) & set(NAMES):
+                yield NAMES[colour], text.get_text()
+
+
+def _at_the_axis(axes: Axes) -> list[str]:
+    ticks = [*axes.get_yticklabels(), *axes.get_xticklabels()]
+    return [tick.get_text() for tick in ticks] + [axes.get_xlabel(), axes.get_title()]
+
+
+def _nameless(figure: Figure) -> set[str]:
+    """Methods that something in a figure of several is coloured by, and nothing beside it names."""
+    each = {axes: _methods(axes) for axes in figure.axes}
+    if len(set().union(*each.values())) < 2:
+        return set()
+    said = {name for name, text in _in_legends(figure) if name in text}
+    return {
+        name
+        for axes, names in each.items()
+        for name in names - said
+        if not any(text.partition(" ")[0].rstrip(":") == name for text in _at_the_axis(axes))
+    }
+
+
+@pytest.mark.parametrize(("gate", "plot"), CASES, ids=lambda value: getattr(value, "title", value))
+def test_each_series_of_a_method_is_beside_its_name(whole, judged, gate, plot):
+    if left_out(plot, judged(gate)):
+        pytest.skip("nothing was written to draw it from")
+    with mpl.rc_context(STYLE):
+        figure = plot.draw(Evidence(whole), judged(gate))
+        svg(figure, plot.title)
+    assert _nameless(figure) == set()
+
+
+def test_several_methods_are_seen_in_most_figures(whole, judged):
+    """Or the test above would find nothing, and say so of nothing."""
+    several = 0
+    for gate, plot in CASES:
+        if not left_out(plot, judged(gate)):
+            with mpl.rc_context(STYLE):
+                figure = plot.draw(Evidence(whole), judged(gate))
+            several += len(set().union(*map(_methods, figure.axes))) > 1
+    assert several >= LEAST_SEVERAL
