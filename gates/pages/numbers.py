@@ -8,7 +8,7 @@ import re
 from gates.closeness import EVIDENCE, RATIO
 from gates.pages.guide import unit
 from gates.report import Answer, Recount
-from gates.words import number, three
+from gates.words import number, percent, three
 
 RATES = (
     "_share",
@@ -131,6 +131,11 @@ def beyond(answer: Answer) -> str:
     text = human(answer, abs(found - limit)).removeprefix("×")
     text = f"{text.removesuffix(' %')} points" if text.endswith(" %") else text
     return f"{'over' if answer.comparison == '<=' else 'short'} by {text}"
+
+
+def share_between(share: float, low: float, high: float) -> str:
+    """A share and its interval: `48.1 % (28.7 to 68.1)`."""
+    return f"{percent(share)} ({three(100 * low)} to {three(100 * high)})"
 
 
 def rests_on(counted: str) -> str:
