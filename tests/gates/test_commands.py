@@ -142,7 +142,10 @@ def beneath(stand_in):
     put, calls = stand_in
     put("gates.card.history.require_history")
     put("gates.rederive.rederive")
-    return [("require_history", ROOT), *(("rederive", ROOT, gate, gate != "E") for gate in "ABCDE")], calls
+    return [
+        ("require_history", ROOT),
+        *(("rederive", ROOT, gate, gate != "E") for gate in "ABCDE"),
+    ], calls
 
 
 def test_nobody_signs_before_chain_history_and_journals_were_asked(stand_in, beneath, capsys):
