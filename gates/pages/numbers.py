@@ -135,6 +135,11 @@ def beyond(answer: Answer) -> str:
     return f"{'over' if answer.comparison == '<=' else 'short'} by {text}"
 
 
+def share_between(share: float, low: float, high: float) -> str:
+    """A share and its interval: `48.1 % (28.7 to 68.1)`."""
+    return f"{percent(share)} ({three(100 * low)} to {three(100 * high)})"
+
+
 def rests_on(counted: str) -> str:
     """What a number counts, for a reader: `none of 1,080 arrivals`."""
     text = re.sub(r"^0 of ", "none of ", counted)

@@ -11,10 +11,12 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
 from gates.pages.figures import Plot, Table, colours, dashes, in_order
 from gates.pages.limits import draw_limit, limit_of
+from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import losses, updates_of
 from gates.reproducibility.settings import GENERATORS
-from genpolicy.pages.figures.drawing import GREY, new_figure
+from gates.words import percent
+from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 from genpolicy.policies.validation_row import VALIDATION_FILE, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
 
@@ -106,7 +108,8 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     falls.set_yticks(np.arange(len(found)), labels)
     falls.set_ylim(len(found) - 0.4, -0.9)
     falls.axvline(0.0, color=GREY, lw=0.8)
-    falls.set_xlabel(f"fall, share, {report.settings['confidence']:.0%} interval")
+    falls.set_xlabel(f"fall, {100 * report.settings['confidence']:g} % interval")
+    in_percent(falls.xaxis)
     draw_limit(falls, report, LIMIT)
     # The names at the right stand at rows of another panel, which says nothing of these curves.
     for name in in_order(names):
@@ -131,8 +134,8 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
     rows = [
         (
             training.method, f"{training.moments[1]}", *map(_text, training.spread),
-            _text(training.fall),
-            "asked by samples" if training.candidate or limit is None else f"{limit:g}",
+            share_between(*training.fall),
+            "asked by samples" if training.candidate or limit is None else percent(limit),
             training.table,
         )
         for training in _trainings(evidence, report)

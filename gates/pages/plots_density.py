@@ -6,10 +6,11 @@ from matplotlib.figure import Figure
 
 from gates.evidence import Evidence
 from gates.pages.figures import Plot, Table, colours, in_order, markers
+from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.densities import Agreement, agreement, densities
 from gates.reproducibility.settings import DENSITY
-from genpolicy.pages.figures.drawing import GREY, new_figure
+from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 
 
 def _densities(evidence: Evidence, report: GateReport) -> Figure:
@@ -22,6 +23,7 @@ def _densities(evidence: Evidence, report: GateReport) -> Figure:
         axes.plot(own["share"], own["gain"], shape[method], ms=4, color=colour[method])
         axes.axhline(0.0, color=GREY, lw=0.8)
         axes.set_xlim(-0.03, 1.03)
+        in_percent(axes.xaxis)
         axes.set_xlabel(f"{method}: share of samples in the mode")
     places[0].set_ylabel("log-density over the mean, nats")
     return figure
@@ -46,7 +48,7 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
 def _text(item: Agreement) -> str:
     if math.isnan(item.share):
         return "not known"
-    return f"{item.share:.3g} ({item.interval[0]:.3g} to {item.interval[1]:.3g})"
+    return share_between(item.share, *item.interval)
 
 
 PLOTS = (

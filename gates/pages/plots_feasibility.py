@@ -14,7 +14,7 @@ from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from genpolicy.evidence.rows.shadow import CandidateRow
-from genpolicy.pages.figures.drawing import GREY, HATCHES, new_figure
+from genpolicy.pages.figures.drawing import GREY, HATCHES, in_milli, in_percent, new_figure
 
 
 def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
@@ -52,6 +52,7 @@ def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
             )
         axes.set_xticks(np.arange(len(LAYERS) + 1), ["drawn", *LAYERS], rotation=40, ha="right")
         axes.set_ylim(0, 1.05)
+        in_percent(axes.yaxis)
         axes.set_title(title)
     pair[0].set_ylabel("share still standing")
     figure.legend(*pair[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
@@ -84,6 +85,9 @@ def _distribution(
             _draw_curve(axes, rows[column], text, **look)
     axes.axhline(0.95, color=GREY, lw=0.8)
     axes.set_ylim(0, 1.12)
+    in_percent(axes.yaxis)
+    if column.endswith("_m"):
+        in_milli(axes.xaxis)
     draw_limit(axes, report, name)
     axes.set_xlabel(label)
     axes.set_ylabel("share of chunks (line: 95 %)")
@@ -105,7 +109,7 @@ def _projection(evidence: Evidence, report: GateReport) -> Figure:
         report,
         column="position_change_m",
         by="mode",
-        label="change of position by projection, m",
+        label="change of position by projection, mm",
         name="projection_p95_m",
     )
 

@@ -19,9 +19,10 @@ from gates.reproducibility.front import (
 )
 from gates.reproducibility.latency_budget import LATENCY, MILLI
 from gates.reproducibility.settings import COVERAGE, RELOAD
+from gates.words import percent, three
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.rows.reproducibility import CoverageRow
-from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
+from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure, plain_ticks
 
 Sweeps = dict[str, tuple[list[Setting], Choice, float]]
 
@@ -73,6 +74,7 @@ def _front(evidence: Evidence, report: GateReport) -> Figure:
         plain_ticks(axes.xaxis)
         axes.set_ylabel(name)
         axes.set_ylim(bottom=0)
+    in_percent(places[0].yaxis)
     places[1].set_xlabel("whole answer, p95 of all terms summed, ms; line: deadline")
     figure.legend(loc="outside lower center", ncols=4)
     return figure
@@ -103,9 +105,9 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
                     tolerance,
                     f"{setting.p50_s * MILLI:.3g}",
                     f"{setting.answer_s * MILLI:.3g}",
-                    f"{setting.coverage:.3g} ({setting.coverage_lower:.3g})",
+                    f"{percent(setting.coverage)} ({percent(setting.coverage_lower)})",
                     f"{setting.chunk_error:.3g}",
-                    f"{setting.jerk_p95_m_s3:.4g}",
+                    three(setting.jerk_p95_m_s3),
                     _said(setting, on=on),
                 )
             )

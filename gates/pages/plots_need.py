@@ -17,7 +17,7 @@ from genpolicy.audit.rows import ModeOutcome, ReplayRow, SituationRow, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.pages.figures import captions, checks, situations
-from genpolicy.pages.figures.drawing import BLUE, new_figure
+from genpolicy.pages.figures.drawing import BLUE, in_percent, new_figure
 
 EXAMPLES = f"{AUDIT}/examples.parquet"
 ALIGNMENT = f"{AUDIT}/alignment.parquet"
@@ -113,6 +113,7 @@ def _baselines(evidence: Evidence, report: GateReport) -> Figure:
     axes.set_yticks(np.arange(len(order)), labels)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.02)
+    in_percent(axes.xaxis)
     draw_limit(axes, report, "baseline_mode_coverage")
     axes.set_xlabel("mean share of modes covered, situations with two modes")
     return figure

@@ -21,6 +21,8 @@ from genpolicy.pages.figures.drawing import (
     RED,
     SKY,
     TEAL,
+    in_milli,
+    in_percent,
     new_figure,
 )
 from genpolicy.statistics.intervals import clopper_pearson
@@ -71,7 +73,8 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
     axes.set_ylim(len(conditions) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
     axes.set_xlim(0, 1.02)
-    axes.set_xlabel(f"share of successful rollouts, exact {level:.0%} interval over rollouts")
+    in_percent(axes.xaxis)
+    axes.set_xlabel(f"share of successful rollouts, exact {100 * level:g} % interval over rollouts")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
@@ -90,7 +93,9 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
         share = np.linspace(1 / len(kept), 1, len(kept))
         axes.step(kept, share, where="post", color=colour[method], ls=dash[method], label=method)
     axes.set_ylim(0, 1.12)
-    axes.set_xlabel("p95 of the action age in a rollout, s")
+    in_percent(axes.yaxis)
+    in_milli(axes.xaxis)
+    axes.set_xlabel("p95 of the action age in a rollout, ms")
     axes.set_ylabel("share of rollouts")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
@@ -122,6 +127,7 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
     axes.set_yticks(np.arange(len(methods)), methods)
     axes.invert_yaxis()
     axes.set_xlim(0, 1)
+    in_percent(axes.xaxis)
     axes.set_xlabel("share of rollouts, all conditions")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

@@ -19,9 +19,16 @@ from gates.reproducibility.latency_budget import (
     spans_of_processes,
 )
 from gates.reproducibility.settings import COVERAGE, RELOAD
+from gates.words import three
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.rows.reproducibility import CandidatesRow, CoverageRow, LatencyRow
-from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
+from genpolicy.pages.figures.drawing import (
+    GREY,
+    in_milli,
+    in_percent,
+    new_figure,
+    plain_ticks,
+)
 
 TEMPERATURES = ("warm", "cold")
 CANDIDATES_DRAWN = "artifacts/latency/candidates.parquet"
@@ -75,7 +82,7 @@ def _budgets(evidence: Evidence, report: GateReport) -> Table:
         budgets = [budget_of(own, name, confidence=confidence) for name in TEMPERATURES]
         ends = [_cells(budget.end_to_end) for budget in budgets]
         table.append((method, "end to end", "", "", *itertools.chain(*ends)))
-        sums = [("", f"{budget.sum_of_p95_s * MILLI:.4g}", "") for budget in budgets]
+        sums = [("", three(budget.sum_of_p95_s * MILLI), "") for budget in budgets]
         table.append((method, "p95 of the terms, summed", "", "", *itertools.chain(*sums)))
         for term in TERMS if method in report.candidates else ():
             cells = [_cells(budget.terms[term]) for budget in budgets]
@@ -86,14 +93,14 @@ def _budgets(evidence: Evidence, report: GateReport) -> Table:
 
 
 def _cells(spans: Spans) -> tuple[str, str, str]:
-    return _interval(spans.p50), _interval(spans.p95), f"{spans.longest * MILLI:.4g}"
+    return _interval(spans.p50), _interval(spans.p95), three(spans.longest * MILLI)
 
 
 def _interval(found: tuple[float, float, float]) -> str:
     """Milliseconds; an end that so few cannot bound is said to be open."""
     point, lower, upper = (value * MILLI for value in found)
-    ends = [f"{end:.4g}" if math.isfinite(end) else "open" for end in (lower, upper)]
-    return f"{point:.4g} ({ends[0]} to {ends[1]})"
+    ends = [three(end) if math.isfinite(end) else "open" for end in (lower, upper)]
+    return f"{three(point)} ({ends[0]} to {ends[1]})"
 
 
 def _coverage(evidence: Evidence, report: GateReport) -> Figure:
@@ -115,8 +122,10 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
         axes.set_xlabel("network evaluations per sample (NFE)")
     left.set_ylim(0, 1.05)
     right.set_ylim(bottom=0)
+    in_percent(left.yaxis)
+    in_milli(right.yaxis)
     left.set_ylabel("every mode reached, share")
-    right.set_ylabel("spread of samples, m")
+    right.set_ylabel("spread of samples, mm")
     figure.legend(loc="outside lower center", ncols=4)
     return figure
 

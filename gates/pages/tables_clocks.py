@@ -6,6 +6,7 @@ from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.report import GateReport, parse_section, report_path
 from gates.stress.clocks import AGES, INVOCATIONS, SHOWN, WALL_CLOCK, Difference, compared
 from gates.stress.rollouts import StressSettings
+from gates.words import percent, points, three
 from genpolicy.evidence.rows.clocks import ClockTickRow
 
 TICKS = f"{WALL_CLOCK}/ticks.parquet"
@@ -33,11 +34,13 @@ def _listed(evidence: Evidence, report: GateReport) -> Table:
 def _line(item: Difference) -> tuple[str, ...]:
     kind, _, reason = item.name.partition(":")
     low, high = item.interval
-    shares = tuple("" if value is None else f"{value:.3g}" for value in (item.wall, item.virtual))
+    # Ages are compared by the distance of their distributions, which is no share.
+    told = three if item.wall is None else points
+    shares = tuple("" if value is None else percent(value) for value in (item.wall, item.virtual))
     answer = "within" if item.within else "outside" if item.outside else "astride"
     return (
-        SHOWN[kind] + (f": {reason}" if reason else ""), *shares, f"{low:.2g} to {high:.2g}",
-        "none" if item.tolerance is None else f"{item.tolerance:g}", answer,
+        SHOWN[kind] + (f": {reason}" if reason else ""), *shares, f"{told(low)} to {told(high)}",
+        "none" if item.tolerance is None else told(item.tolerance), answer,
     )  # fmt: skip
 
 

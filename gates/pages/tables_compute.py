@@ -5,6 +5,7 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
 from gates.pages.bound import require_bound
 from gates.pages.figures import Listing, Table
+from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.compute import COMPUTE, Cost, cost_of
 from gates.reproducibility.convergence import last_quarter, updates_of
@@ -64,7 +65,7 @@ def _falls(evidence: Evidence, root: str, method: str, confidence: float) -> str
         fall = last_quarter(evidence, root, method, confidence=confidence)
     except MissingEvidenceError as error:
         return str(error)
-    return f"{fall.share:.3g} ({fall.interval[0]:.3g} to {fall.interval[1]:.3g})"
+    return share_between(fall.share, *fall.interval)
 
 
 LISTING = Listing(

@@ -17,8 +17,8 @@ from gates.feasibility.settings import (
     UNKNOWN,
 )
 from gates.pages.figures import Folded, Listing, Table, in_order
+from gates.pages.numbers import share_between
 from gates.pages.reasons import REASON_WORDS, said
-from gates.pages.tables_survival import percent
 from gates.report import GateReport
 from genpolicy.evidence.rows.shadow import CandidateRow
 
@@ -68,7 +68,7 @@ def _of(rows: pd.DataFrame, own: pd.DataFrame, confidence: float) -> str:
         rows.index.isin(own.index), episodes_of(rows).to_numpy(), confidence=confidence,
         favourable=False,
     )  # fmt: skip
-    text = f"{len(own)} of {len(rows)}: {percent(share, (low, high))}"
+    text = f"{len(own)} of {len(rows)}: {share_between(share, low, high)}"
     return text + (f", {unknown} of them unknown" if unknown else "")
 
 

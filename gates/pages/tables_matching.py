@@ -3,6 +3,7 @@
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.figures import Listing, Table
 from gates.pages.limits import limit_of
+from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import Fall
 from gates.reproducibility.matching import pairs
@@ -45,7 +46,7 @@ def _rules(evidence: Evidence, report: GateReport) -> Table:
 
 
 def _fall(fall: Fall) -> str:
-    return f"{fall.share:.3g} ({fall.interval[0]:.3g} to {fall.interval[1]:.3g})"
+    return share_between(fall.share, *fall.interval)
 
 
 RULES = Listing(

@@ -7,6 +7,7 @@ import pandas as pd
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
+from gates.pages.numbers import share_between
 from gates.report import GateReport, parse_section, report_path
 from gates.stress.monitors import (
     ALARMS,
@@ -20,6 +21,7 @@ from gates.stress.monitors import (
     watched_of,
 )
 from gates.stress.rollouts import StressSettings
+from gates.words import percent
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorUnavailableRow
 
 UNAVAILABLE = f"{MONITORS}/unavailable.parquet"
@@ -48,7 +50,7 @@ def _listed(evidence: Evidence, report: GateReport) -> Table:
                     candidate, f"{one.monitor}{' (control)' if one.is_control else ''}",
                     f"{one.failures}", _interval(one.coverage), _interval(one.false_alarms),
                     f"{phase}: {_interval(interval)}" if phase else "no success",
-                    f"{one.allowed:g}{silent}", _number(one.delay_s), _number(one.cost),
+                    f"{percent(one.allowed)}{silent}", _number(one.delay_s), _number(one.cost),
                 )
             )  # fmt: skip
         for name, cost in (("never", found.quiet_cost), ("always", found.loud_cost)):
@@ -137,7 +139,7 @@ def _settings(evidence: Evidence, report: GateReport) -> StressSettings:
 
 def _interval(found: tuple[float, float, float]) -> str:
     share_, low, high = found
-    return "no case" if math.isnan(share_) else f"{share_:.2g} ({low:.2g} to {high:.2g})"
+    return "no case" if math.isnan(share_) else share_between(share_, low, high)
 
 
 def _number(value: float | None) -> str:

@@ -22,6 +22,7 @@ from gates.stress.recoveries import (
     recoveries,
 )
 from gates.stress.rollouts import ROLLOUTS, StressSettings
+from gates.words import percent, points, three
 from genpolicy.evidence.rows.stress import RolloutRow
 
 HEADS = (
@@ -60,8 +61,8 @@ def _line(rows: pd.DataFrame, confidence: float) -> tuple[str, ...]:
     return (
         f"{len(rows)}",
         f"{rows['start'].nunique()}",
-        f"{flags(rows, 'recovered').sum():g}, share {share:.3g}",
-        f"{lower:.3g} to {upper:.3g}",
+        f"{flags(rows, 'recovered').sum():g}, {percent(share)}",
+        f"{three(100 * lower)} to {percent(upper)}",
         f"{ended.get('handed_back', 0)}",
         f"{flags(rows, 'resampled_only').sum():g}",
         _typical(rows, "duration_s"),
@@ -109,10 +110,10 @@ def _covered(evidence: Evidence, report: GateReport) -> Table:
                     lines.append((candidate, baseline, condition, str(missing), *none))
                     continue
                 low, high = found.interval
-                both = "" if found.gain_of_both is None else f"{found.gain_of_both:+.3g}"
+                both = "" if found.gain_of_both is None else points(found.gain_of_both)
                 lines.append((
-                    candidate, baseline, condition, f"{found.starts}", f"{found.own:.3g}",
-                    f"{found.other:.3g}", f"{found.gain:+.3g}", f"{low:+.3g} to {high:+.3g}",
+                    candidate, baseline, condition, f"{found.starts}", percent(found.own),
+                    percent(found.other), points(found.gain), f"{points(low)} to {points(high)}",
                     f"{found.both}", both or "never both",
                 ))  # fmt: skip
     return (heads, *lines)

@@ -10,8 +10,9 @@ from gates.pages.figures import Listing, Plot, Table, colours, dashes, in_order
 from gates.report import GateReport
 from gates.stress.curves import Curve, curves
 from gates.stress.rollouts import CURVES, ROLLOUTS
+from gates.words import percent
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.pages.figures.drawing import GREY, new_figure
+from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 
 
 def _curves(evidence: Evidence, report: GateReport) -> list[Curve]:
@@ -35,8 +36,8 @@ def _listed(evidence: Evidence, report: GateReport) -> Table:
     lines = []
     for curve in _curves(evidence, report):
         shares = "; ".join(
-            f"{point.severity:g}{' (judged)' if point.judged else ''}: {point.share:.2f} "
-            f"({point.lower:.2f} to {point.upper:.2f})"
+            f"{point.severity:g}{' (judged)' if point.judged else ''}: {percent(point.share)} "
+            f"({percent(point.lower)} to {percent(point.upper)})"
             for point in curve.points
         )
         middle, low, high = map(_said, curve.half)
@@ -69,6 +70,8 @@ def _draw(evidence: Evidence, report: GateReport) -> Figure:
                     place.axvline(point.severity, color=GREY, lw=0.8)
             place.set_xlabel(f"{name}: {curve.field}")
         place.set_ylim(0, 1.02)
+    for place in axes:
+        in_percent(place.yaxis)
     axes[0].set_ylabel("share of successful rollouts")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

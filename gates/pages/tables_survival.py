@@ -8,6 +8,7 @@ from gates.feasibility.candidates import admissible, episodes_of
 from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, SHADOW
 from gates.pages.bound import require_bound
 from gates.pages.figures import Listing, Table, in_order
+from gates.pages.numbers import share_between
 from gates.pages.reasons import said
 from gates.report import GateReport
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow
@@ -16,12 +17,6 @@ COUNTS = f"{SHADOW}/counts.parquet"
 EXECUTED, QUEUED = "executed", "still queued"
 WAYS = "_on_the_way"
 """Ends the names of incidents; whatever else is not held out is corrupted."""
-
-
-def percent(share: float, interval: tuple[float, float]) -> str:
-    """A share and its interval as a person reads them."""
-    low, high = (f"{100 * end:.3g}" for end in interval)
-    return f"{100 * share:.3g} % ({low} to {high})"
 
 
 def _survival(evidence: Evidence, report: GateReport) -> Table:
@@ -38,7 +33,7 @@ def _survival(evidence: Evidence, report: GateReport) -> Table:
                 )
                 lines.append(
                     (method, said(fixture), said(str(mode)) or "unassigned",
-                     f"{passed.sum():g} of {len(rows)}", percent(share, (interval[0], interval[1])),
+                     f"{passed.sum():g} of {len(rows)}", share_between(share, *interval),
                      str(episodes.nunique()))
                 )  # fmt: skip
     return ("method", "observations", "mode", "admitted", "share, interval", "episodes"), *lines
@@ -76,7 +71,7 @@ def _share(count: float, generated: float, held: pd.DataFrame, report: GateRepor
     confidence = float(report.settings["confidence"])
     share = count / generated
     interval = interval_of(share, episodes, confidence=confidence, favourable=False)
-    return percent(share, interval)
+    return share_between(share, *interval)
 
 
 def _where(fixture: str) -> str:

@@ -15,6 +15,7 @@ import pandas as pd
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.reproducibility.latency_budget import LATENCY, MILLI, P95, budget_of
 from gates.reproducibility.settings import COVERAGE, RELOAD
+from gates.words import percent, points
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, SweepLatencyRow
 
@@ -168,18 +169,18 @@ def advice(found: Choice, *, deadline_s: float) -> tuple[str, str]:
         return f"None: no answer keeps {deadline_s * MILLI:g} ms.", "Nothing is left to lose."
     why = (
         f"{deploy.name}: the cheapest whose answer keeps {deadline_s * MILLI:g} ms and whose "
-        f"coverage, {deploy.coverage:.3g}, is not below {best.coverage_lower:.3g}, where the "
-        f"interval of the best begins ({best.name}, {best.coverage:.3g})."
+        f"coverage, {percent(deploy.coverage)}, is not below {percent(best.coverage_lower)}, where "
+        f"the interval of the best begins ({best.name}, {percent(best.coverage)})."
     )
     if cheaper is None:
         return why, "There is no cheaper one in the sweep."
     return why, (
         f"{cheaper.name} saves {(deploy.p50_s - cheaper.p50_s) * MILLI:.3g} ms; coverage "
-        f"{cheaper.coverage - deploy.coverage:+.3g}, chunk error "
+        f"{points(cheaper.coverage - deploy.coverage)}, chunk error "
         f"{_relative(cheaper.chunk_error, deploy.chunk_error)}, jerk "
         f"{_relative(cheaper.jerk_p95_m_s3, deploy.jerk_p95_m_s3)}."
     )
 
 
 def _relative(value: float, to: float) -> str:
-    return f"{value / to - 1.0:+.1%}" if to > 0.0 else f"{value:.3g} against 0"
+    return f"{100 * (value / to - 1.0):+.3g} %" if to > 0.0 else f"{value:.3g} against 0"

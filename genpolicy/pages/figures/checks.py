@@ -6,7 +6,18 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from genpolicy.pages.figures.drawing import BLUE, GREY, INK, ORANGE, PALETTE, RED, SKY, new_figure
+from genpolicy.pages.figures.drawing import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PALETTE,
+    RED,
+    SKY,
+    in_milli,
+    in_percent,
+    new_figure,
+)
 from genpolicy.pages.figures.limits import limit_line
 from genpolicy.pages.figures.plane import scatter_of
 from genpolicy.pages.figures.situations import NothingToDrawError
@@ -45,6 +56,7 @@ def strata_bars(frame: pd.DataFrame, *, level: float, limit: float | None) -> Fi
     axes.hlines(places, lower, upper, color=INK, lw=1.0)
     names = zip(tested["variable"], tested["phase"], strict=True)
     axes.set_yticks(places, [f"{variable} · {phase}" for variable, phase in names])
+    in_percent(axes.xaxis)
     if limit is not None:
         limit_line(axes, limit)
     said = f"share of uncertainty removed (red: adjusted p at most {level:g})"
@@ -83,9 +95,10 @@ def mode_success(frame: pd.DataFrame, *, confidence: float, limit: float | None)
     )
     axes.set_ylim(-0.7, len(frame) - 0.3)
     axes.set_xlim(0, 1.02)
+    in_percent(axes.xaxis)
     if limit is not None:
         limit_line(axes, limit)
-    axes.set_xlabel(f"share of successful episodes, exact {confidence:.0%} interval")
+    axes.set_xlabel(f"share of successful episodes, exact {100 * confidence:g} % interval")
     return figure
 
 
@@ -163,7 +176,8 @@ def realignment(
         axes.set_xlabel("recording order")
     before.set_title(f"as recorded: {modes_before} episodes with several modes", fontsize=9)
     after.set_title(f"realigned: {modes_after} episodes with several modes", fontsize=9)
-    before.set_ylabel("clock offset, s")
+    before.set_ylabel("clock offset, ms")
+    in_milli(before.yaxis)
     handles, labels = before.get_legend_handles_labels()
     figure.legend(handles[:9], labels[:9], loc="outside lower center", ncols=5)
     return figure
@@ -216,6 +230,7 @@ def support_map(frame: pd.DataFrame, *, names: Sequence[str], unit: str, limit: 
     )
     bars.set_ylim(-0.8, max(len(table), 3) - 0.2)
     bars.set_xlim(0, 1.02)
+    in_percent(bars.xaxis)
     limit_line(bars, limit)
     bars.set_xlabel("share with enough neighbours")
     return figure

@@ -93,6 +93,16 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_minor_locator(NullLocator())
 
 
+def in_percent(axis: Axis) -> None:
+    """Shares on an axis as percent; what is drawn stays a share."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(100 * value, 9):g} %"))
+
+
+def in_milli(axis: Axis) -> None:
+    """Metres or seconds on an axis in mm or ms; what is drawn stays in SI units."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(1000 * value, 9):g}"))
+
+
 def drawn(draw: Callable[[], Figure], label: str, *, salt: str) -> Markup:
     """Call `draw` in the project's style and give its figure as an SVG element.
 

@@ -140,6 +140,16 @@ def test_the_page_draws_what_does_not_hold_in_red_and_says_it_before_any_gain(la
     assert text.index('class="bar broken"') < text.index('class="bar"')
 
 
+def test_an_owner_sees_beside_each_number_what_it_rests_on(ladder):
+    write_index(ladder)
+    text = (ladder / "reports/index.html").read_text()
+    duties = text[text.index("7 · Your part") : text.index("8 · The gates")]
+    (row,) = [row for row in duties.split("<tr ") if "#mode_success_lower" in row]
+    assert ">at least 79.6 %</a><small>24 of 25 episodes</small></td>" in row
+    (row,) = [row for row in duties.split("<tr ") if "#label_disagreement" in row]
+    assert ">at most 8.81 %</a><small>none of 40 replays</small></td>" in row
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

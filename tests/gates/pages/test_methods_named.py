@@ -1,7 +1,7 @@
 """Figures with several methods: whatever has the colour of one is beside its name.
 
 A name stands in a legend whose sample has that colour, or at the axis where a row, a column or a
-panel is the method's own.
+panel is the method's own. And whatever is measured is in the unit that a person uses.
 """
 
 from collections.abc import Iterator
@@ -25,6 +25,8 @@ from genpolicy.pages.figures.drawing import STYLE, svg
 
 NAMES = {colour.lower(): name for name, colour in METHODS.items()}
 CASES = [(gate, plot) for gate in "ABCD" for plot in PLOTS[gate] if isinstance(plot, Plot)]
+SCENE = ("x,", "y,", "z,", "action chunk,")
+"""Positions in a scene of a metre, and actions, which have the unit of their contract."""
 LEAST_SEVERAL = 8
 """Figures of the whole evidence in which several methods are told apart by colour."""
 
@@ -86,6 +88,22 @@ def test_each_series_of_a_method_is_beside_its_name(whole, judged, gate, plot):
         figure = plot.draw(Evidence(whole), judged(gate))
         svg(figure, plot.title)
     assert _nameless(figure) == set()
+
+
+@pytest.mark.parametrize(("gate", "plot"), CASES, ids=lambda value: getattr(value, "title", value))
+def test_an_axis_has_the_unit_that_a_person_uses(whole, judged, gate, plot):
+    """Shares are percent; what is shorter than a metre or a second is in mm or ms."""
+    if left_out(plot, judged(gate)):
+        pytest.skip("nothing was written to draw it from")
+    with mpl.rc_context(STYLE):
+        figure = plot.draw(Evidence(whole), judged(gate))
+        svg(figure, plot.title)
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            label, ticks = axis.get_label_text(), [t.get_text() for t in axis.get_ticklabels()]
+            if label.startswith("share") or ": share" in label or label.endswith(", share"):
+                assert ticks and all(tick.endswith(" %") for tick in ticks), label
+            assert not label.endswith((", s", ", m")) or label.startswith(SCENE), label
 
 
 def test_several_methods_are_seen_in_most_figures(whole, judged):

@@ -19,13 +19,12 @@ def test_it_says_in_words_what_it_draws(whole, judged):
     heads, *rows = picture.in_words
     by_method = {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
     limit = _stated(report).threshold
-    assert (
-        f"limit {limit:g}" in picture.svg and f"{limit:g}" == by_method["chunked_bc"]["its limit"]
-    )
+    said = f"{100 * limit:g} %"
+    assert f"limit {said}" in picture.svg and said == by_method["chunked_bc"]["its limit"]
     assert by_method["flow"]["its limit"] == "asked by samples"
     low, high = _stated(report).interval
     fall = by_method["chunked_bc"]["fall over the last quarter"]
-    assert fall.endswith(f"({low:.3g} to {high:.3g})") and fall.startswith("0.04 ")
+    assert fall.endswith(f"({100 * low:.3g} to {100 * high:.3g})") and fall.startswith("4 % ")
     for row in by_method.values():
         assert row["from"] in report.materials  # what is drawn is bound
     page = gate_page(whole, report)
@@ -36,8 +35,8 @@ def test_it_is_drawn_by_the_confidence_judged_by(copied):
     report, (picture,) = judged_by_others(copied, "B", PLOTS)
     low, high = _stated(report).interval
     (row,) = [row for row in picture.in_words if row[0] == "chunked_bc"]
-    assert any(cell.endswith(f"({low:.3g} to {high:.3g})") for cell in row)
-    assert "90% interval" in picture.svg
+    assert any(cell.endswith(f"({100 * low:.3g} to {100 * high:.3g})") for cell in row)
+    assert "90 % interval" in picture.svg
 
 
 def test_a_training_that_was_not_measured_at_three_quarters_is_not_drawn(copied, judged):

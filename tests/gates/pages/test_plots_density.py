@@ -18,7 +18,7 @@ def test_it_says_in_words_how_often_the_denser_mode_is_drawn_more_often(whole, j
     report = judged("B")
     (picture,) = draw_all(PLOTS, Evidence(whole), report)
     low, high = clopper_pearson(12, 16)
-    said = f"0.75 ({low:.3g} to {high:.3g})"
+    said = f"75 % ({100 * low:.3g} to {100 * high:.3g})"
     assert picture.in_words[1:] == (
         ("diffusion", said, "16", "16", "0"), ("flow", said, "16", "16", "0"),
     )  # fmt: skip
@@ -29,7 +29,7 @@ def test_it_says_in_words_how_often_the_denser_mode_is_drawn_more_often(whole, j
 def test_its_interval_is_that_of_the_confidence_judged_by(copied):
     _, (picture,) = judged_by_others(copied, "B", PLOTS)
     low, high = clopper_pearson(12, 16, 0.9)
-    assert picture.in_words[1][1] == f"0.75 ({low:.3g} to {high:.3g})"
+    assert picture.in_words[1][1] == f"75 % ({100 * low:.3g} to {100 * high:.3g})"
 
 
 def test_a_method_of_ties_alone_knows_nothing(copied, judged):

@@ -16,7 +16,11 @@ BASELINES = next(plot for plot in PLOTS if plot.title == "Modes that the simple 
 def test_they_are_drawn_by_the_level_and_confidence_judged_by(copied):
     _, pictures = judged_by_others(copied, "A", OWN)
     drawn = "".join(picture.svg or "" for picture in pictures)
-    assert "adjusted p at most 0.013" in drawn and "90%" in drawn and "95%" not in drawn
+    assert (
+        "adjusted p at most 0.013" in drawn
+        and "90 % interval" in drawn
+        and "95 % interval" not in drawn
+    )
 
 
 def test_without_the_confidence_judged_by_no_interval_is_drawn(whole, judged):

@@ -14,7 +14,7 @@ TABLE = "stress/rollouts.parquet"
 
 def test_the_interval_of_success_is_drawn_by_the_confidence_judged_by(copied):
     _, pictures = judged_by_others(copied, "D", PLOTS)
-    assert any("exact 90% interval" in picture.svg for picture in pictures)
+    assert any("exact 90 % interval" in picture.svg for picture in pictures)
 
 
 def test_without_the_confidence_judged_by_no_interval_is_drawn(whole, judged):

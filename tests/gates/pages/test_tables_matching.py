@@ -20,7 +20,7 @@ def test_every_candidate_stands_beside_every_trained_baseline(whole, judged):
         line = dict(zip(heads, row, strict=True))
         assert line["updates"] == f"{evidence.UPDATES} and {evidence.UPDATES}"
         assert (line["by equal updates"], line["by equal convergence"]) == ("PASS", "PASS")
-        assert line["candidate's loss still falls"].startswith("0.04 (")
+        assert line["candidate's loss still falls"].startswith("4 % (")
         assert line["may still learn"] == "neither"
     assert RULES.title in gate_page(whole, judged("B"))
 

@@ -29,7 +29,7 @@ def test_each_monitor_stands_beside_both_controls_and_both_ends_of_the_cost(tabl
     ]  # fmt: skip
     support = next(line for line in tables[""] if line[:2] == ("flow", "support"))
     assert support[2] == "6"
-    assert support[3].startswith("1 (")
+    assert support[3].startswith("100 % (")
     assert support[-2:] == ("2", "1.6")
 
 

@@ -32,8 +32,8 @@ def test_each_phase_and_cause_has_a_line_with_its_interval_and_cost(whole, judge
     hits, n = int(own["recovered"].sum()), len(DRILLED)
     lower, upper = clopper_pearson(hits, n, 0.95)
     assert (line["entered"], line["starts"]) == (f"{n}", f"{n}")
-    assert line["recovered"] == f"{hits}, share {hits / n:.3g}"
-    assert line["interval"] == f"{lower:.3g} to {upper:.3g}"
+    assert line["recovered"] == f"{hits}, {100 * hits / n:.3g} %"
+    assert line["interval"] == f"{100 * lower:.3g} to {100 * upper:.3g} %"
     times = sorted(2.0 + 0.01 * start for start in DRILLED)
     middle, high = (times[-(-p * (n - 1) // 100)] for p in (50, 95))
     assert line["time, s"] == f"{middle:.3g}, p95 {high:.3g}"
@@ -71,8 +71,11 @@ def test_every_pair_of_candidate_and_simpler_method_stands_from_the_same_starts(
     for line in lines:
         told = dict(zip(heads, line, strict=True))
         own, other = (float(drill[name].mean()) for name in line[:2])
-        assert (told["covered"], told["by the other"]) == (f"{own:.3g}", f"{other:.3g}")
-        assert float(told["difference"]) == pytest.approx(own - other, abs=6e-4)
+        assert (told["covered"], told["by the other"]) == (
+            f"{100 * own:.3g} %", f"{100 * other:.3g} %",
+        )  # fmt: skip
+        gain, unit = told["difference"].split(" ")
+        assert unit == "points" and float(gain) == pytest.approx(100 * (own - other), abs=0.06)
     page = gate_page(whole, judged("D"))
     assert "Recovery by phase and cause" in page and "beyond a simpler method" in page
 

@@ -6,7 +6,8 @@ import pytest
 from gates.evidence import Evidence
 from gates.feasibility.settings import CANDIDATES
 from gates.pages.figures import draw_all
-from gates.pages.tables_survival import COUNTS, LISTINGS, percent
+from gates.pages.numbers import share_between
+from gates.pages.tables_survival import COUNTS, LISTINGS
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -44,7 +45,7 @@ def test_a_mode_that_loses_half_shows_half_with_its_interval_over_episodes(copie
     assert 0 < passed < total and own["right"]["share, interval"].startswith("100 %")
     share = passed / total
     ends = clopper_pearson(int(round(share * episodes, 9) // 1), episodes, 0.95)
-    assert own["left"]["share, interval"] == percent(share, ends)
+    assert own["left"]["share, interval"] == share_between(share, *ends)
 
 
 def test_every_action_went_somewhere(whole, judged):
@@ -79,4 +80,4 @@ def test_what_was_discarded_stands_by_its_reason_with_an_interval(copied):
     ],
 )
 def test_a_share_is_said_in_percent(share, interval, text):
-    assert percent(share, interval) == text
+    assert share_between(share, *interval) == text

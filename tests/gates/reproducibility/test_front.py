@@ -48,10 +48,10 @@ def test_the_cheapest_within_the_interval_of_the_best_that_keeps_the_deadline():
     assert [s.name for s in (found.deploy, found.best, found.cheaper)] == ["four", "eight", "two"]
     deploy, loses = advice(found, deadline_s=0.15)
     assert deploy == (
-        "four: the cheapest whose answer keeps 150 ms and whose coverage, 0.86, is not below "
-        "0.85, where the interval of the best begins (eight, 0.95)."
+        "four: the cheapest whose answer keeps 150 ms and whose coverage, 86 %, is not below "
+        "85 %, where the interval of the best begins (eight, 95 %)."
     )
-    assert loses == "two saves 2 ms; coverage -0.26, chunk error +100.0%, jerk +0.0%."
+    assert loses == "two saves 2 ms; coverage -26 points, chunk error +100 %, jerk +0 %."
 
 
 def test_a_setting_that_diverges_is_never_advised_and_never_on_the_front():

@@ -148,7 +148,7 @@ def test_the_page_has_every_number(ladder):
     whole = {line[0]: line[6:] for line in lines if line[1] == "all of these"}
     assert whole == {"diffusion": ("differ", "48"), "flow": ("agree", "48")}
     missed = next(line for line in lines if line[:2] == ("diffusion", "missed deadlines"))
-    assert missed[2:4] == ("0.5", "0") and missed[5:7] == ("0.1", "outside")
+    assert missed[2:4] == ("50 %", "0 %") and missed[5:7] == ("+10 points", "outside")
     ticks = tables_clocks.CLOCKS.folded[0].read(Evidence(ladder), report)
     assert ticks[1] == ("diffusion", str(48 * 16), "2", "4")
 
