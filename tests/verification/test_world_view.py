@@ -9,6 +9,7 @@ SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
+    "arrival": 0,
 }  # fmt: skip
 
 
@@ -142,3 +143,29 @@ def test_another_mode_of_the_controller_objects_and_voids_what_was_seen_before(v
 def test_layers_and_reason_of_a_verdict_agree(view, layers, reason, found):
     m = {"t": 0, "chunk_id": "c", "layers": layers, "first_reason": reason}
     assert [rule for rule, _ in view.follow("candidate", m)] == found
+
+
+def test_what_was_here_at_an_event_is_void_though_it_was_seen_as_late(view):
+    """A force at the very time of the observation: the chunk was there, and another came after."""
+    void = {"reason": "force_event", "before_ns": 1000 * MS, "t": 1000 * MS}
+    assert list(view.follow("invalidate", void, 1)) == []
+    assert rules(view) == ["P1.void"] and rules(view, arrival=1) == []
+
+
+def test_a_person_who_clears_nothing_voids_no_chunk_that_is_here(view):
+    reset = {"event": "human_reset", "state": "run", "detail": "spotter", "t": 1000 * MS}
+    assert list(view.follow("supervisor", reset, 1)) == [] and rules(view) == []
+
+
+@pytest.mark.parametrize("event", ["force", "collision", "emergency_stop", "silence"])
+@pytest.mark.parametrize("state", ["run", "watchdog_hold"])
+def test_a_gate_that_says_why_it_stops_and_does_not_is_found(view, event, state):
+    message = {"event": event, "state": state, "detail": "", "t": 1100 * MS}
+    assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.gate"]
+    assert "P7.stop" in rules(view)
+
+
+@pytest.mark.parametrize(("event", "state"), [("watchdog", "protective stop"), ("resume", "run")])
+def test_a_supervisor_has_few_words(view, event, state):
+    message = {"event": event, "state": state, "detail": "", "t": 1100 * MS}
+    assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.words"]
