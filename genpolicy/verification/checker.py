@@ -81,7 +81,7 @@ class _Session:
     ) -> None:
         self.name, self.report, self.expected, self.proof = name, report, expected, proof
         self.settings: Message = {}
-        self.world = WorldView()
+        self.world = WorldView(expected)
         self.balance = Balance()
         self.invocations = Invocations()
         self.joined = Joined()

@@ -22,6 +22,8 @@ class ExpectedSettings:
         replan_lead_steps: A chunk that begins behind this row is late.
         late_chunk: `continue`, `hold` or `fallback`, by phase; only where a phase says `continue`
             may a late chunk be executed.
+        force_limit_n: Force at which the supervisor stops, by phase. A journal does not declare
+            it; above all of them nothing may be accepted.
     """
 
     execution_horizon: int
@@ -32,6 +34,7 @@ class ExpectedSettings:
     controller_mode: str
     replan_lead_steps: int
     late_chunk: dict[str, str]
+    force_limit_n: dict[str, float]
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""

@@ -1,11 +1,15 @@
 """What was true when: phase, calibration, weights, stops and voiding events, followed again."""
 
+import math
 from collections.abc import Callable, Iterator
 
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
 
 Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
+ROUNDING_N = 1e-6
+"""A state has six decimals."""
 STATES = frozenset({"run", "watchdog_hold", *STOP_STATES})
 STOPPING = frozenset({"force", "collision", "emergency_stop", "silence", "restarted"})
 """Events of a supervisor that leave it in a stop."""
@@ -21,11 +25,16 @@ KINDS = frozenset({
 class WorldView:
     """The checker's own picture of the present, built from raw events.
 
+    Args:
+        expected: What the caller knows of it; None: no measured force is too much.
+
     Attributes:
         fallback_hash: Identity of the fallback planner, as declared by the session.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, expected: ExpectedSettings | None = None) -> None:
+        self._most_n = max(expected.force_limit_n.values(), default=0.0) if expected else math.inf
+        self._felt_n = 0.0
         self.fallback_hash = ""
         self.phase = self.epoch = ""
         self.newest_ns: int | None = None
@@ -57,6 +66,8 @@ class WorldView:
             yield "journal.kind", f"There is no event of kind {kind!r}."
         elif kind in self._followed:
             yield from self._followed[kind](m)
+        elif kind == "state":
+            self._felt_n = m["force_n"]
         elif kind == "scene":
             self.scene = m["bodies"]
         elif kind == "active":
@@ -101,6 +112,8 @@ class WorldView:
             yield "P1.controller", f"The controller is in mode {self.controller!r}."
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
+        if not self._felt_n <= self._most_n + ROUNDING_N:
+            yield "P7.force", f"{self._felt_n} N are measured, and no phase bears them."
         yield from self._voided(seen_ns, chunk["arrival"])
 
     def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:

@@ -20,6 +20,7 @@ EXPECTED = ExpectedSettings(
     controller_mode=CONTROLLER_MODE,
     replan_lead_steps=EXECUTION.replan_lead_steps,
     late_chunk=EXECUTION.late_by_phase,
+    force_limit_n=EXECUTION.force_limit_n,
 )
 
 

@@ -2,10 +2,16 @@
 
 import pytest
 
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.world_view import WorldView
 
 MS = 1_000_000
 SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
+EXPECTED = ExpectedSettings(
+    execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
+    controller_mode="m", replan_lead_steps=3, late_chunk={},
+    force_limit_n={"approach": 20.0, "insert": 40.0},
+)  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
@@ -169,3 +175,17 @@ def test_a_gate_that_says_why_it_stops_and_does_not_is_found(view, event, state)
 def test_a_supervisor_has_few_words(view, event, state):
     message = {"event": event, "state": state, "detail": "", "t": 1100 * MS}
     assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.words"]
+
+
+@pytest.mark.parametrize(("felt_n", "found"), [(40.0, []), (40.01, ["P7.force"])])
+def test_above_the_force_that_any_phase_bears_nothing_is_accepted(felt_n, found):
+    """A supervisor that is deaf says nothing; what was measured does."""
+    own, known = WorldView(EXPECTED), WorldView()
+    for view in (own, known):
+        view.fallback_hash = "f"
+        list(view.follow("active", {"checkpoint": "w", "sampler": "s"}))
+        list(view.follow("controller", {"mode": "m", "t": 0}))
+        observed(view, 1000)
+        assert list(view.follow("state", {"force_n": felt_n, "t": 1000 * MS})) == []
+    assert rules(own) == found and rules(known) == []
+    assert list(own.follow("state", {"force_n": 1.0, "t": 1050 * MS})) == [] and rules(own) == []
