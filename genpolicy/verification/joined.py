@@ -52,9 +52,11 @@ class Joined:
             else:
                 self._passed.discard(m["chunk_id"])
                 self._refused.add(m["chunk_id"])
-        elif kind == "enqueue" and m["chunk_id"] in self._refused:
-            yield "P1.verdict", f"{m['chunk_id']!r} comes, and was refused when it was judged."
-        elif kind == "enqueue" and m["source"] == "policy":
+        elif kind == "enqueue":
+            if m["chunk_id"] in self._refused:
+                yield "P1.verdict", f"{m['chunk_id']!r} comes, and was refused when it was judged."
+            if m["source"] != "policy":
+                return
             if self._rule or m["chunk_id"] in self._made:
                 yield from self._entered(m, void_before, settings)
             self._queued[m["chunk_id"]] = m
