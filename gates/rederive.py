@@ -181,6 +181,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         controller_mode=CONTROLLER_MODE,
         replan_lead_steps=execution.replan_lead_steps,
         late_chunk=execution.late_by_phase,
+        force_limit_n=execution.force_limit_n,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 STILL_RAD = 1e-6
 """Joints of one pose, from solutions that began elsewhere."""
+SEAM_COMMANDS = 2
+"""Commands before the last one that the rates at a seam rest on."""
 Array = NDArray[np.float64]
 
 
@@ -47,14 +49,16 @@ class Continuity:
         self.given_ns: int | None = None
         self._last: Given | None = None
         self._resumed_ns = NEVER_NS
+        self._commands = 0
 
     def note(self, now_ns: int, chunk: "Admitted", row: int, action: Array) -> None:
         """The controller was given a row."""
         self._last, self.given_ns = Given(chunk, row, bytes_of(action)), now_ns
+        self._commands += 1
 
     def forget(self) -> None:
         """A person moves the arm, or has: no command says where it is."""
-        self._last = None
+        self._last, self._commands = None, 0
 
     def after(self, resumed_ns: int) -> None:
         """A stop was cleared at this time: the arm stands where the brakes or a person left it."""
@@ -81,7 +85,8 @@ class Continuity:
         holds = round((now_ns - given_ns) / about.times.period_ns) - 1
         context = getattr(chunk, "context", None)
         told = bytes_of(getattr(context, "last_action", None))
-        return told == last.action and rests(context, holds)
+        before = self._commands - 1 + max(holds, 0)
+        return told == last.action and rests(context, holds) and knows(context, before)
 
 
 def rests(context: object, holds: int) -> bool:
@@ -98,6 +103,19 @@ def rests(context: object, holds: int) -> bool:
         return bool(np.all(np.abs(before - command) <= STILL_RAD))
     except (TypeError, ValueError, IndexError):
         return False
+
+
+def knows(context: object, before: int) -> bool:
+    """Whether a chunk was checked with the commands before the last one, of so many that were.
+
+    Acceleration at the seam rests on one of them and jerk on two; of what is left out feasibility
+    assumes nothing, and asks nothing.
+    """
+    try:
+        told = np.shape(getattr(context, "q_cmd_history", None))
+    except (TypeError, ValueError):
+        told = ()
+    return (told[0] if told else 0) >= min(before, SEAM_COMMANDS)
 
 
 def bytes_of(values: object) -> bytes:

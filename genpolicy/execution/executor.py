@@ -136,7 +136,6 @@ class Executor:
         self.stub.note_controller(mode)
         self._view = replace(self._view, controller=mode)
         if before not in ("", mode):
-            self.stub.void(DiscardReason.STOPPED, now_ns)
             self._void(now_ns, DiscardReason.STOPPED, now_ns)
 
     # -- who commands -------------------------------------------------------------------------
@@ -318,17 +317,17 @@ class Executor:
         self._queue.continuity.after(supervisor.resumed_ns)
 
     def _void(self, now_ns: int, reason: DiscardReason, before_ns: int) -> None:
-        """Nothing conditioned before this time, and nothing that is here, is used any more."""
+        """Nothing seen before this time, and nothing that is here, is used here or at the stub."""
         self._view = self._view.voided(reason, before_ns, self._queue.arrivals)
+        self.stub.void(reason, before_ns, self._queue.arrivals)
         self._drop(now_ns, reason)
 
     def _drop(self, now_ns: int, reason: DiscardReason) -> None:
         self._queue.drop(now_ns, self._present(), reason)
 
     def _invalidate(self, now_ns: int, before_ns: int, reason: DiscardReason) -> None:
-        """Void what was conditioned before `before_ns`, here and at the stub."""
+        """Void what was conditioned before `before_ns`, and say so."""
         self._journal.add("invalidate", now_ns, {"reason": str(reason), "before_ns": before_ns})
-        self.stub.void(reason, before_ns)
         self._void(now_ns, reason, before_ns)
 
     def _enter(self, now_ns: int, mode: ExecutorMode) -> None:

@@ -5,6 +5,7 @@ state; failures are bounded; every transition is journaled. The trajectory of a 
 from the task and goes through feasibility like any other proposal.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ from genpolicy.execution.cell import (
 )
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
-from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.execution.nanoseconds import ns_or_none, to_ns
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
@@ -68,11 +69,14 @@ class Recovery:
     def feel(self, now_s: float, force_n: float) -> None:
         """Note a contact force; while it holds or a primitive runs a new peak goes on record.
 
-        It is the peak of this recovery, which may be less than was felt before it. What is done
-        about a force is the supervisor's.
+        It is the peak of this recovery, which may be less than was felt before it. What is no
+        finite number goes on record as the largest there is. What is done about a force is the
+        supervisor's.
         """
-        if self.state in (RecoveryState.HOLD, *PRIMITIVES) and force_n > self._peak_n:
-            self._peak_n = float(force_n)
+        known = ns_or_none(force_n) is not None  # a number, and no larger than any force is
+        size_n = float(force_n) if known else sys.float_info.max
+        if self.state in (RecoveryState.HOLD, *PRIMITIVES) and size_n > self._peak_n:
+            self._peak_n = size_n
             payload = {"force_n": self._peak_n}
             self._journal.add("recovery_force", self._journal.clock(now_s), payload)
 

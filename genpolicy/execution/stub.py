@@ -101,9 +101,9 @@ class ControllerStub:
         self._continuity.forget()
         self.void(DiscardReason.RESET, now_ns)
 
-    def void(self, reason: DiscardReason, before_ns: int) -> None:
-        """Nothing conditioned before `before_ns` is accepted from now on."""
-        self._view = self._view.voided(reason, before_ns)
+    def void(self, reason: DiscardReason, before_ns: int, arrivals: int = 0) -> None:
+        """Nothing seen before `before_ns`, and none of the first `arrivals`, is accepted now."""
+        self._view = self._view.voided(reason, before_ns, arrivals)
 
     def poll(self, now_s: float) -> None:
         """The consumer's own clock: runs the watchdog also while the executor is paused."""

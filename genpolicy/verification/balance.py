@@ -49,7 +49,7 @@ class Balance:
         if (ended == "executed") != (self.accepted[arrival] > 0):
             yield f"Arrival {arrival} ended as {ended}, {self.accepted[arrival]} were accepted."
         unknown = set(lost) - REASONS
-        if unknown or (ended == "discarded" and reason not in REASONS):
+        if unknown or ((ended == "discarded" or reason is not None) and reason not in REASONS):
             yield f"Arrival {arrival} was lost for {sorted(unknown) or reason}, no known reason."
         self.lost_actions.update(lost)
         if ended == "executed":

@@ -18,7 +18,7 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.attended import Attended
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
-from genpolicy.verification.expected import ExpectedSettings
+from genpolicy.verification.expected import ALWAYS, ExpectedSettings
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.joined import Joined
 from genpolicy.verification.journal_source import Message, read_messages
@@ -81,13 +81,13 @@ class _Session:
     ) -> None:
         self.name, self.report, self.expected, self.proof = name, report, expected, proof
         self.settings: Message = {}
-        self.world = WorldView()
+        self.world = WorldView(expected)
         self.balance = Balance()
         self.invocations = Invocations()
         self.joined = Joined()
         self.attended = Attended()
         self.measured = Measured(proof)
-        self.continuity = Continuity()
+        self.continuity = Continuity(proof)
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.closed: set[int] = set()
@@ -130,7 +130,7 @@ class _Session:
             self._flag_all(self.measured.follow(kind, m))
             self._follow(kind, m)
             self._flag_all(self.joined.follow(kind, m, self.world.void_before, self.settings))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except Exception as error:  # of what was forged, reading may raise anything
             self.flag("journal.malformed", f"A {kind} event cannot be read ({error!r}).")
 
     def finish(self) -> None:
@@ -158,7 +158,7 @@ class _Session:
             for sentence in self.balance.check_end(m, self.n):
                 self.flag("conservation", sentence)
         else:
-            self._flag_all(self.world.follow(kind, m))
+            self._flag_all(self.world.follow(kind, m, self.balance.generated_chunks))
             if kind == "supervisor" and self.world.stopped:
                 self._answered(self.t)
                 self.unanswered_ns = None
@@ -320,28 +320,28 @@ class _Session:
             self.flag("P6.state_age", f"{chunk['chunk_id']!r} rests on joints {age_ns} ns old.")
 
     def _check_close(self, kind: str, m: Message) -> None:
-        arrival, reason = m["arrival"], m.get("reason")
+        arrival, reason = m["arrival"], str(m["reason"]) if kind == "discard" else None
         if m.get("at") == "arrival":
             self.report.chunks += 1
-            for sentence in self.balance.refused(arrival, m["rows"], str(reason)):
+            for sentence in self.balance.refused(arrival, m["rows"], reason):
                 self.flag("conservation", sentence)
         elif arrival in self.open:
-            del self.open[arrival]
+            if self.open.pop(arrival)["chunk_id"] != m["chunk_id"]:
+                self.flag("conservation", f"Arrival {arrival} ends as {m['chunk_id']!r}.")
             for sentence in self.balance.closed(arrival, m["rows"], m["ended"], reason):
                 self.flag("conservation", sentence)
         else:
             self.flag("conservation", f"Arrival {arrival} ends without being queued.")
         if m["ended"] == "discarded":
             self.report.discarded[str(reason)] += 1
-        displaced = reason in ("superseded", "queue_overflow")
-        breaks_chain = kind == "discard" and not displaced
+        breaks_chain = kind == "discard" and reason not in ("superseded", "queue_overflow")
         if self.head is not None and self.head[0] == arrival and breaks_chain:
             self.head = None
 
     def _check_settings(self, m: Message) -> None:
-        expected = self.expected.declared() if self.expected else {}
+        expected = {**ALWAYS, **(self.expected.declared() if self.expected else {})}
         self.settings = {**m, **expected}
-        self.world.fallback_hash = m["fallback_hash"]
+        self.world.fallback_hash = expected["fallback_hash"]
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")

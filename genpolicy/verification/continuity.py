@@ -1,28 +1,48 @@
 """From the last command on, every step is one that was checked, at the pace it was checked at.
 
-A chunk says from which command it was checked; its rows were checked one after the other. What
-the controller was given must go that way, whatever the clock says.
+A chunk says from which commands it was checked; its rows were checked one after the other. What
+the controller was given must go that way, whatever the clock says. Where the robot is known, the
+joints that a chunk says were commanded must be those commands: speed, acceleration and jerk of its
+first rows were checked from these joints, and from none that it leaves out.
 """
 
 import struct
+from collections import deque
 from collections.abc import Iterator
+from itertools import chain, repeat
 
-from genpolicy.verification.journal_source import Message
+import numpy as np
+from numpy.typing import NDArray
 
+from genpolicy.contract.action import POSITION, ROTATION
+from genpolicy.contract.rotation import angle_between, rotation_from_6d
+from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.motion import POSE_TOLERANCE_M, POSE_TOLERANCE_RAD, MotionProof
+
+Array = NDArray[np.float64]
 Finding = tuple[str, str]
-RULE, PACE = "P5.continuity", "P5.pace"
+RULE, PACE, COMMANDS = "P5.continuity", "P5.pace", "P6.commands"
+REMEMBERED = 3
+"""The last command and two before it: what jerk at a boundary rests on."""
 
 
 class Continuity:
-    """Follows what the controller accepted in one session."""
+    """Follows what the controller accepted in one session.
 
-    def __init__(self) -> None:
+    Args:
+        proof: Knows the robot; None: joints are not held against commands.
+    """
+
+    def __init__(self, proof: MotionProof | None = None) -> None:
+        self._proof = proof
         self._last: tuple[int, int, str] | None = None
         self._accepted_ns: int | None = None
+        self._given: deque[tuple[int, Array, Array]] = deque(maxlen=REMEMBERED)
 
     def forget(self) -> None:
         """Somebody else moves the arm, or has: no command says where it is."""
         self._last = None
+        self._given.clear()
 
     def follow(self, chunk: Message, m: Message, period_ns: int) -> Iterator[Finding]:
         """Take an accepted action of a chunk in; yields what nobody checked about it."""
@@ -41,7 +61,51 @@ class Continuity:
                 yield RULE, f"{chunk['chunk_id']!r} was checked in motion, after {holds} holds."
         if since_ns is not None and 10 * (m["t"] - since_ns) < 9 * period_ns:
             yield PACE, f"Two actions are {m['t'] - since_ns} ns apart."
+        begins = last is None or last[0] != m["arrival"]
         self._last, self._accepted_ns = (m["arrival"], row, m["action"]), m["t"]
+        if self._proof is None or motion is None:
+            return
+        first, behind = chunk["checked_rows"]
+        path, joints = floats(motion["q_rad"]), len(self._proof.expected.torque_nm)
+        if motion["joints"] != joints or path.size != (behind - first) * joints:
+            return  # a violation of its own (P6.ground)
+        if begins:
+            yield from self._from_commands(chunk, m["t"], period_ns)
+        if first <= row < behind:  # else another one (P1.checked_rows)
+            q_rad = path.reshape(-1, joints)[row - first]
+            self._given.append((m["t"], floats(m["action"]), q_rad))
+
+    def _from_commands(self, chunk: Message, now_ns: int, period_ns: int) -> Iterator[Finding]:
+        """Whether a chunk was checked from the commands that were in force, newest first."""
+        assert self._proof is not None
+        name, motion = repr(chunk["chunk_id"]), chunk["motion"]
+        before_rad = floats(motion["q_before_rad"]).reshape(-1, motion["joints"])
+        told_rad = [floats(motion["q_cmd_rad"]), *before_rad[::-1]][:REMEMBERED]
+        given = list(self._in_force(now_ns, period_ns))[:REMEMBERED]
+        if len(told_rad) < len(given):
+            yield COMMANDS, f"{name} was checked from {len(told_rad)} of {len(given)} commands."
+        if not given:
+            given = [(floats(motion["last_action"]), told_rad[0])]
+        for back, (q_rad, (action, given_rad)) in enumerate(zip(told_rad, given, strict=False)):
+            position, rotation = self._proof.forward(q_rad)
+            away_m = float(np.linalg.norm(position - action[POSITION]))
+            turned = float(angle_between(rotation, rotation_from_6d(action[ROTATION])))
+            if not (away_m <= POSE_TOLERANCE_M and turned <= POSE_TOLERANCE_RAD):
+                yield (
+                    COMMANDS,
+                    f"{name} was checked from joints {away_m:.3g} m and {turned:.3g} rad off the "
+                    f"command {back} before the last.",
+                )
+            elif not np.all(np.abs(q_rad - given_rad) <= self._proof.expected.branch_rad):
+                yield COMMANDS, f"{name} was checked from joints of another branch."
+
+    def _in_force(self, now_ns: int, period_ns: int) -> Iterator[tuple[Array, Array]]:
+        """Action and joints that were commanded in each period before now, newest first."""
+        ends_ns = [now_ns, *(given_ns for given_ns, _, _ in list(self._given)[:0:-1])]
+        return chain.from_iterable(
+            repeat((action, q_rad), min(max(round((end - begun) / period_ns), 1), REMEMBERED))
+            for end, (begun, action, q_rad) in zip(ends_ns, reversed(self._given), strict=False)
+        )
 
 
 def _stood_still(motion: Message, holds: int) -> bool:

@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
+ALWAYS = {"version": 9, "fallback_hash": "classical-fallback"}
+"""What every session declares: the journal that is read here, since in another one the same words
+may mean something else, and who makes the fallback's chunks, since nobody else commands as such."""
+
 
 @dataclass(frozen=True)
 class ExpectedSettings:
@@ -18,6 +22,8 @@ class ExpectedSettings:
         replan_lead_steps: A chunk that begins behind this row is late.
         late_chunk: `continue`, `hold` or `fallback`, by phase; only where a phase says `continue`
             may a late chunk be executed.
+        force_limit_n: Force at which the supervisor stops, by phase. A journal does not declare
+            it; above all of them nothing may be accepted.
     """
 
     execution_horizon: int
@@ -28,6 +34,7 @@ class ExpectedSettings:
     controller_mode: str
     replan_lead_steps: int
     late_chunk: dict[str, str]
+    force_limit_n: dict[str, float]
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""

@@ -23,6 +23,7 @@ class Joined:
         self._rule = ""
         self._made: dict[str, Message] = {}
         self._passed: set[str] = set()
+        self._refused: set[str] = set()
         self._queued: dict[str, Message] = {}
 
     def follow(
@@ -41,14 +42,21 @@ class Joined:
         elif kind == "joined":
             self._made[m["chunk_id"]] = m
             self._passed.discard(m["chunk_id"])
+            self._refused.discard(m["chunk_id"])
             if m["rule"] != self._rule:
                 yield "P6.rule", f"A chunk joins by {m['rule']!r} in a session of {self._rule!r}."
         elif kind == "candidate":
             if all(passed is True for passed in m["layers"].values()):
                 self._passed.add(m["chunk_id"])
+                self._refused.discard(m["chunk_id"])
             else:
                 self._passed.discard(m["chunk_id"])
-        elif kind == "enqueue" and m["source"] == "policy":
+                self._refused.add(m["chunk_id"])
+        elif kind == "enqueue":
+            if m["chunk_id"] in self._refused:
+                yield "P1.verdict", f"{m['chunk_id']!r} comes, and was refused when it was judged."
+            if m["source"] != "policy":
+                return
             if self._rule or m["chunk_id"] in self._made:
                 yield from self._entered(m, void_before, settings)
             self._queued[m["chunk_id"]] = m
@@ -79,7 +87,9 @@ class Joined:
     def _linked(self, chunk_id: str) -> dict[str, Message]:
         """Chunks along the chain of predecessors, by invocation."""
         found: dict[str, Message] = {}
-        while (chunk := self._queued.get(chunk_id)) is not None:
+        passed: set[str] = set()
+        while chunk_id not in passed and (chunk := self._queued.get(chunk_id)) is not None:
+            passed.add(chunk_id)  # a chain that a forger closed has no end
             made = self._made.get(chunk_id)
             found[chunk_id if made is None else made["invocation"]] = chunk
             chunk_id = chunk["predecessor"]

@@ -43,7 +43,9 @@ def read_messages(path: Path) -> Iterator[tuple[str, Message]]:
             document = json.loads(message.data, parse_constant=_no_constant)
             if not channel.topic.startswith(TOPIC) or not isinstance(document, dict):
                 raise ValueError(f"a message on {channel.topic} that is no journal event")
-            if message.log_time != max(int(document["t"]), 0):
+            if not type(document["t"]) is type(document["n"]) is int:
+                raise ValueError(f"event {document['n']!r} at {document['t']!r}")
+            if message.log_time != max(document["t"], 0):
                 raise ValueError(f"log_time {message.log_time} of an event at {document['t']}")
             yield channel.topic[len(TOPIC) :], document
         if count != summary.statistics.message_count:

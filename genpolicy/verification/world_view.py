@@ -1,11 +1,19 @@
 """What was true when: phase, calibration, weights, stops and voiding events, followed again."""
 
+import math
 from collections.abc import Callable, Iterator
 
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
 
 Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
+ROUNDING_N = 1e-6
+"""A state has six decimals."""
+STATES = frozenset({"run", "watchdog_hold", *STOP_STATES})
+STOPPING = frozenset({"force", "collision", "emergency_stop", "silence", "restarted"})
+"""Events of a supervisor that leave it in a stop."""
+EVENTS = STOPPING | {"human_reset", "watchdog", "watchdog_recovered"}
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
     "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
@@ -17,11 +25,16 @@ KINDS = frozenset({
 class WorldView:
     """The checker's own picture of the present, built from raw events.
 
+    Args:
+        expected: What the caller knows of it; None: no measured force is too much.
+
     Attributes:
         fallback_hash: Identity of the fallback planner, as declared by the session.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, expected: ExpectedSettings | None = None) -> None:
+        self._most_n = max(expected.force_limit_n.values(), default=0.0) if expected else math.inf
+        self._felt_n = 0.0
         self.fallback_hash = ""
         self.phase = self.epoch = ""
         self.newest_ns: int | None = None
@@ -32,18 +45,29 @@ class WorldView:
         self.stopped = self.looked = False
         self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
+        self._arrivals = 0
+        self._void_arrivals: dict[str, int] = {}
         self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
             "observation": self._observe, "mode": self._change_mode, "reset": self._reset,
             "supervisor": self._supervise, "controller": self._change_controller,
             "candidate": self._judge,
         }  # fmt: skip
 
-    def follow(self, kind: str, m: Message) -> Iterator[Finding]:
-        """Take an event in; yields what is wrong with the event itself."""
+    def follow(self, kind: str, m: Message, arrivals: int = 0) -> Iterator[Finding]:
+        """Take an event in; yields what is wrong with the event itself.
+
+        Args:
+            kind: Of the event.
+            m: The event.
+            arrivals: Chunks that arrived before it.
+        """
+        self._arrivals = arrivals
         if kind not in KINDS:
             yield "journal.kind", f"There is no event of kind {kind!r}."
         elif kind in self._followed:
             yield from self._followed[kind](m)
+        elif kind == "state":
+            self._felt_n = m["force_n"]
         elif kind == "scene":
             self.scene = m["bodies"]
         elif kind == "active":
@@ -88,9 +112,17 @@ class WorldView:
             yield "P1.controller", f"The controller is in mode {self.controller!r}."
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
+        if not self._felt_n <= self._most_n + ROUNDING_N:
+            yield "P7.force", f"{self._felt_n} N are measured, and no phase bears them."
+        yield from self._voided(seen_ns, chunk["arrival"])
+
+    def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:
         for cause, before_ns in self.void_before.items():
             if seen_ns < before_ns:
                 yield "P1.void", f"{cause} at {before_ns} ns voids an observation of {seen_ns} ns."
+            # What is as new as the event is void all the same if it was here when it happened.
+            elif arrival < self._void_arrivals[cause]:
+                yield "P1.void", f"{cause} at {before_ns} ns voids what had arrived, as {arrival}."
 
     @staticmethod
     def _judge(m: Message) -> Iterator[Finding]:
@@ -145,15 +177,24 @@ class WorldView:
         reset = m["event"] == "human_reset"
         if reset and not str(m["detail"]).strip():
             yield "P7.reset", "A stop is cleared without a person."
-        restarted, now_stopped = m["event"] == "restarted", m["state"] in STOP_STATES
-        if restarted and not now_stopped:
-            yield "P7.restart", f"A supervisor starts again in {m['state']!r}, not stopped."
+        now_stopped, stopping = m["state"] in STOP_STATES, m["event"] in STOPPING
+        if m["state"] not in STATES or m["event"] not in EVENTS:
+            yield "P7.words", f"No supervisor says {m['event']!r} in {m['state']!r}."
+        if stopping and not now_stopped:
+            rule = "P7.restart" if m["event"] == "restarted" else "P7.gate"
+            yield rule, f"A {m['event']} event leaves {m['state']!r}, not stopped."
         if self.stopped and not now_stopped and not reset:
             yield "P7.sticky", f"A {m['event']} event clears a stop."
-        if now_stopped or reset or restarted:
+        if now_stopped or stopping:
             self._void("a stop", m["t"])
-        # Whatever it says of itself: only a person clears a stop, and a new start is one.
-        self.stopped = now_stopped or ((self.stopped or restarted) and not reset)
+        elif reset:
+            # Of a reset behind no stop nothing is thrown away that was seen as late as it.
+            self._void("a stop", m["t"], arrivals=0)
+        # Whatever it says of itself: only a person clears a stop, and these events are one.
+        self.stopped = now_stopped or stopping or (self.stopped and not reset)
 
-    def _void(self, cause: str, before_ns: int) -> None:
+    def _void(self, cause: str, before_ns: int, arrivals: int | None = None) -> None:
+        """What was seen before an event is void, and what had arrived when it happened."""
+        arrivals = self._arrivals if arrivals is None else arrivals
         self.void_before[cause] = max(before_ns, self.void_before.get(cause, before_ns))
+        self._void_arrivals[cause] = max(arrivals, self._void_arrivals.get(cause, 0))

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from genpolicy.execution.continuity import Continuity, bytes_of, rests
+from genpolicy.execution.continuity import Continuity, bytes_of, knows, rests
 
 ACTION = np.arange(10.0)
 
@@ -82,7 +82,7 @@ MOVING = ((0.0, 0.1), (0.0, 0.05))
     [(57, MOVING, True), (81, MOVING, True), (82, MOVING, False), (107, MOVING, False),
      (107, ((0.0, 0.1), (0.0, 0.0)), True), (157, ((0.0, 0.1), (0.0, 0.0)), False),
      (157, ((0.0, 0.0), (0.0, 0.0)), True), (5007, ((0.0, 0.0), (0.0, 0.0)), True),
-     (107, ((0.0, 0.0), (0.0, 1e-7)), True), (107, np.zeros((0, 2)), True), (107, None, False),
+     (107, ((0.0, 0.0), (0.0, 1e-7)), True), (107, np.zeros((0, 2)), False), (107, None, False),
      (107, "moving", False)],
 )  # fmt: skip
 def test_after_holds_only_an_arm_that_stood_still_goes_on(now_ns, before, holds):
@@ -102,3 +102,22 @@ def test_a_stop_that_was_cleared_is_forgotten_once():
 
 def test_what_cannot_be_read_rests_on_nothing():
     assert rests(None, 0) and not rests(None, 1) and not rests(object(), 2)
+
+
+@pytest.mark.parametrize("given", [1, 2, 3, 7])
+@pytest.mark.parametrize("told", [0, 1, 2, 3])
+def test_a_chunk_was_checked_with_the_commands_before_the_last(given, told):
+    """Without them nobody asked for acceleration and jerk at the seam."""
+    continuity, own = Continuity(), chunk()
+    for row in range(given):
+        continuity.note(50 * row, own, row, ACTION)
+    follower = chunk(ACTION.copy(), np.zeros((told, 2)))
+    assert follows(continuity, follower, 0, 0, 50 * given) is (told >= min(given - 1, 2))
+    continuity.forget()
+    continuity.note(0, own, 0, ACTION)
+    assert follows(continuity, chunk(ACTION.copy(), np.zeros((0, 2))), 0, 0, 50)
+
+
+@pytest.mark.parametrize("told", [None, "moving", [[0.0], [0.0, 1.0]]])
+def test_a_history_that_cannot_be_read_is_none(told):
+    assert not knows(SimpleNamespace(q_cmd_history=told), 1) and knows(None, 0)

@@ -1,11 +1,14 @@
 """Recovery by phase: every transition journaled, failures bounded, a stop from everywhere."""
 
+import math
+import sys
+
 import numpy as np
 import pytest
 
 from genpolicy.errors import ContractError
 from genpolicy.evidence.shadow.rig import EXECUTION, Rig, rig_cell
-from genpolicy.execution.journal import Journal
+from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.execution.recovery import (
     Primitive,
     Recovery,
@@ -239,3 +242,15 @@ def test_one_failure_may_be_the_limit_and_plans_are_copied():
     assert recovery.advance(0.0) is S.CLASSICAL_RETURN
     recovery.primitive_failed(0.1, "rejected")
     assert recovery.state is S.ABORT
+
+
+@pytest.mark.parametrize("force_n", [math.inf, math.nan, 10**400, None, "hard"])
+def test_a_force_that_is_no_number_is_the_largest_and_costs_no_journal(force_n, tmp_path):
+    journal = Journal("rig")
+    recovery = Recovery(EXECUTION, journal)
+    recovery.trigger(0.0, "approach", "silence")
+    for felt_n in (3.0, force_n, force_n, 4.0):
+        recovery.feel(0.0, felt_n)
+    told = [e.payload["force_n"] for e in journal.events() if e.kind == "recovery_force"]
+    assert told == [3.0, sys.float_info.max]
+    write_journal(tmp_path / "journal.mcap", [journal])

@@ -192,3 +192,26 @@ def test_an_offer_of_other_kinds_is_refused_and_never_raises(bad):
     for nothing in (None, 3, object()):
         assert rig.stub.offer(nothing, chunk.actions[0], **offer) == "infeasible"
     assert rig.stub.accepted == 0 and rig.stub.invalid == 4
+
+
+@pytest.mark.parametrize("event", ["force_event", "collision_event", "diverge", "stop"])
+def test_what_was_here_at_an_event_is_refused_though_it_was_seen_as_late(event):
+    """The executor has forgotten that it happened, at the very time of the observation."""
+    names = [check.name for check in CHECKS if check.name.startswith("after_")]
+    rig = Rig(checks=without(IMITATED, *names), stub_checks=IMITATED)
+    rig.tick(1)
+    rig.observe()
+    rig.deliver(rig.chunk())
+    if event == "diverge":
+        rig.observe(divergence_m=1.0)
+    elif event == "stop":
+        rig.supervisor.emergency_stop(rig.now_s)
+        rig.supervisor.human_reset(rig.now_s, "spotter")
+    else:
+        getattr(rig.executor, event)(rig.now_s)
+    rig.tick(2)
+    assert rig.stub.accepted == 0 and rig.stub.stale == 1
+    rig.observe()
+    rig.deliver(rig.chunk(predecessor_chunk_id=""))
+    rig.tick(1)
+    assert rig.stub.accepted == 1

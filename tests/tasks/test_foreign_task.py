@@ -236,6 +236,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         controller_mode=CONTROLLER_MODE,
         replan_lead_steps=cell.execution.replan_lead_steps,
         late_chunk=cell.execution.late_by_phase,
+        force_limit_n=cell.execution.force_limit_n,
     )
     motion = expected_motion(cell.checker.cell, rollouts[0].setup.task.action_at)
     report = check_journal(journal, expected, motion)

@@ -80,3 +80,10 @@ def test_what_is_still_queued_is_counted_by_what_was_not_accepted():
         "events": 2,
     }
     assert list(balance.check_end(claimed, 2)) == []
+
+
+@pytest.mark.parametrize("reason", ["", "mislaid"])
+def test_the_rest_of_a_chunk_that_was_executed_is_lost_for_a_known_reason_too(reason):
+    rows = {"executed": 1, "stopped": 3}
+    assert list(book().closed(0, rows, "executed", "stopped")) == []
+    assert len(list(book().closed(0, rows, "executed", reason))) == 1

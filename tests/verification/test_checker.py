@@ -6,9 +6,10 @@ from dataclasses import replace
 import pytest
 
 from genpolicy.evidence.shadow.rig import EXECUTION, HORIZONS, ROWS, Rig, passing_verdict
+from genpolicy.execution.checks import CHECKS, without
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.expected import ExpectedSettings
+from genpolicy.verification.expected import ALWAYS, ExpectedSettings
 
 EXPECTED = ExpectedSettings(
     execution_horizon=HORIZONS.execution_horizon,
@@ -19,6 +20,7 @@ EXPECTED = ExpectedSettings(
     controller_mode=CONTROLLER_MODE,
     replan_lead_steps=EXECUTION.replan_lead_steps,
     late_chunk=EXECUTION.late_by_phase,
+    force_limit_n=EXECUTION.force_limit_n,
 )
 
 
@@ -227,3 +229,88 @@ def test_a_mode_that_changes_voids_what_was_seen_before():
         message["n"] = n
     found = rules(check_messages(kept))
     assert "P1.void" in found and "P1.controller" not in found
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda rig: rig.executor.force_event(rig.now_s),
+        lambda rig: rig.executor.collision_event(rig.now_s),
+        lambda rig: rig.observe(divergence_m=1.0),
+        lambda rig: (
+            rig.supervisor.emergency_stop(rig.now_s)
+            or rig.supervisor.human_reset(rig.now_s, "spotter")
+        ),
+    ],
+)
+def test_an_event_as_late_as_the_observation_voids_the_chunk_that_is_here(event):
+    """Executor and stub that have forgotten it: nobody else would say so."""
+    names = {check.name for check in CHECKS if check.name.startswith("after_")}
+    rig = Rig(checks=without(CHECKS, "issued", *names))
+    rig.tick(1)
+    rig.observe()
+    rig.deliver(rig.chunk())
+    event(rig)
+    rig.tick(2)
+    assert rig.stub.accepted == 2
+    assert rules(check_messages(messages(rig.end()))) == {"P1.void"}
+
+
+def judged(honest, passed):
+    """The first chunk was judged so, just before it came."""
+    layers = dict.fromkeys((f"layer_{n}" for n in range(5)), True) | {"layer_5": passed}
+    place = next(i for i, (kind, _) in enumerate(honest) if kind == "enqueue")
+    verdict = {**{key: honest[place][1][key] for key in ("session", "n", "t", "chunk_id")},
+               "method": "rig", "index": 0, "layers": layers, "measures": {},
+               "first_reason": None if passed else "expired"}  # fmt: skip
+    journal = [*honest[:place], ("candidate", verdict), *copy.deepcopy(honest[place:])]
+    for n, (_, message) in enumerate(journal):
+        message["n"] = n
+    journal[-1][1]["events"] += 1
+    return journal
+
+
+def test_a_chunk_that_was_refused_when_it_was_judged_does_not_come(honest):
+    assert rules(check_messages(judged(honest, True))) == set()
+    assert rules(check_messages(judged(honest, False))) == {"P1.verdict"}
+
+
+@pytest.mark.parametrize(("key", "value"), [("version", 8), ("fallback_hash", "c" * 64)])
+def test_what_every_session_declares_is_no_choice_of_its_own(honest, key, value):
+    assert honest[0][1][key] == ALWAYS[key]
+    honest[0][1][key] = value
+    assert rules(check_messages(honest)) == {"settings.limits"}
+
+
+def test_a_chunk_ends_under_its_own_name(honest):
+    find(honest, "finish")["chunk_id"] = "chunk-9"
+    assert rules(check_messages(honest)) == {"conservation"}
+
+
+@pytest.mark.parametrize("key", ["q_cmd_rad", "q_before_rad"])
+def test_numbers_that_are_none_are_a_violation_and_no_crash(key):
+    rig = Rig()
+    rig.run(2)
+    rig.advance(0.15)
+    rig.run(2)
+    journal = messages(rig.end())
+    chunks = [m for kind, m in journal if kind == "enqueue"]
+    chunks[1]["motion"][key] = "00" * 9
+    assert "journal.malformed" in rules(check_messages(journal))
+
+
+def test_a_chain_of_predecessors_that_is_closed_is_read_to_an_end(honest):
+    """The second names the first; here the first comes again and names the second."""
+    honest[0][1]["labels"]["joining"] = "ensemble_oldest"
+    first, second = (m for kind, m in honest if kind == "enqueue")
+    assert second["predecessor"] == first["chunk_id"]
+    at = {"session": "rig", "n": 0, "t": honest[-1][1]["t"]}
+    made = {**at, "invocation": "i", "draw": 0, "rule": "ensemble_oldest", "parents": {}}
+    honest[-1:-1] = [
+        ("enqueue", {**first, **at, "arrival": 2, "predecessor": second["chunk_id"]}),
+        ("joined", {**made, "chunk_id": second["chunk_id"]}),
+        ("enqueue", {**second, **at, "arrival": 3}),
+    ]
+    for n, (_, message) in enumerate(honest):
+        message["n"] = n
+    assert "P3.duplicate" in rules(check_messages(honest))

@@ -1,10 +1,12 @@
 """The checker's own words for what may follow the last command."""
 
 import struct
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from genpolicy.verification.continuity import PACE, RULE, Continuity
+from genpolicy.verification.continuity import COMMANDS, PACE, RULE, Continuity
 
 PERIOD = 50
 
@@ -84,3 +86,71 @@ def test_the_pace_is_nine_tenths_of_a_period(t, found):
 def test_after_holds_a_chunk_was_checked_from_an_arm_that_stood_still(t, before, found):
     start = (chunk(), accept(0, 0))
     assert rules(start, (chunk(before=before), accept(t, 0, arrival=1)))[1] == found
+
+
+class Slide:
+    """A robot of one joint that moves its TCP along x; its second number is its branch."""
+
+    expected = SimpleNamespace(branch_rad=0.1, torque_nm=np.ones(2))
+
+    @staticmethod
+    def forward(q_rad):
+        return np.array([q_rad[0], 0.0, 0.0]), np.eye(3)
+
+
+def at(x):
+    return told(x, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+
+
+def slid(q_cmd, before, *, rows=4):
+    """A chunk that goes on from these joints by one in every row."""
+    ground = {
+        "last_action": at(q_cmd[0]), "q_cmd_rad": told(*q_cmd), "joints": 2,
+        "q_before_rad": told(*np.ravel(before)),
+        "q_rad": told(*np.ravel([[q_cmd[0] + 1 + k, q_cmd[1]] for k in range(rows)])),
+    }  # fmt: skip
+    return {"chunk_id": "c", "checked_rows": [0, rows], "motion": ground}
+
+
+def slides(second, *, t=100, after=2, forget=False):
+    """Findings of a chunk behind so many rows of one that began at 0."""
+    own, first = Continuity(Slide()), slid((0.0, 0.0), [])
+    for row in range(after):
+        assert not list(own.follow(first, accept(50 * row, row, action=at(row + 1.0)), PERIOD))
+    if forget:
+        own.forget()
+    found = own.follow(second, accept(t, 0, arrival=1, action=at(9.0)), PERIOD)
+    return [rule for rule, _ in found]
+
+
+def test_the_joints_that_a_chunk_was_checked_from_are_those_that_were_commanded():
+    assert slides(slid((2.0, 0.0), [[0.5, 0.0], [1.0, 0.0]])) == []
+    assert slides(slid((2.0, 0.05), [[1.0, 0.05]])) == [], "the same pose from another begin"
+
+
+@pytest.mark.parametrize(
+    ("q_cmd", "before"),
+    [
+        ((2.001, 0.0), [[1.0, 0.0]]), ((2.0, 0.0), [[1.001, 0.0]]), ((2.0, 0.0), [[2.0, 0.0]]),
+        ((2.0, 0.0), []), ((2.0, 0.2), [[1.0, 0.2]]),
+    ],
+)  # fmt: skip
+def test_joints_that_nobody_commanded_or_that_are_left_out_are_found(q_cmd, before):
+    """Speed, acceleration and jerk of the first rows were checked from there."""
+    second = slid(q_cmd, before)
+    second["motion"]["last_action"] = at(2.0)
+    assert set(slides(second)) == {COMMANDS}
+
+
+def test_a_hold_counts_as_a_command():
+    assert slides(slid((2.0, 0.0), [[1.0, 0.0], [2.0, 0.0]]), t=150) == []
+    assert slides(slid((2.0, 0.0), [[2.0, 0.0]]), t=150) == [COMMANDS], "of three one is left out"
+    assert slides(slid((2.0, 0.0), [[2.0, 0.0], [2.0, 0.0]]), t=150) == [COMMANDS]
+    assert slides(slid((2.0, 0.0), [[2.0, 0.0], [2.0, 0.0]]), t=200) == []
+
+
+def test_who_moved_the_arm_left_the_commands_behind():
+    assert slides(slid((7.0, 3.0), []), forget=True) == []
+    elsewhere = slid((7.0, 0.0), [])
+    elsewhere["motion"]["last_action"] = at(7.001)
+    assert slides(elsewhere, forget=True) == [COMMANDS]

@@ -1,6 +1,9 @@
 """Journals as files: damaged, empty, or several sessions in one."""
 
+import json
+
 import pytest
+from mcap.writer import Writer
 
 from genpolicy.errors import BadInputError
 from genpolicy.evidence.shadow.rig import Rig
@@ -51,3 +54,17 @@ def test_an_empty_journal_proves_nothing(tmp_path):
     write_journal(path, [Journal("empty")])
     report = check_journal(path)
     assert report.sessions == 0 and report.checked_actions == 0
+
+
+@pytest.mark.parametrize(("n", "t"), [(0, "0"), (0, 0.0), (0, False), ("0", 0), (None, 0)])
+def test_a_number_or_a_time_that_is_no_whole_number_is_refused(tmp_path, n, t):
+    path = tmp_path / "journal.mcap"
+    writer = Writer(str(path))
+    writer.start()
+    schema = writer.register_schema("s", "jsonschema", b"{}")
+    channel = writer.register_channel("/journal/hold", "json", schema)
+    event = json.dumps({"session": "s", "n": n, "t": t, "reason": "empty"}).encode()
+    writer.add_message(channel, log_time=0, data=event, publish_time=0)
+    writer.finish()
+    with pytest.raises(BadInputError, match="whole MCAP journal"):
+        check_journal(path)

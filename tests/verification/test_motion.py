@@ -175,7 +175,7 @@ def test_the_first_row_turns_from_the_last_command(still, expected, poses):
     motion = enqueued(still)["motion"]
     before = np.array([*HOME[:6], HOME[6] - 0.1])
     motion["last_action"] = encode_actions(poses(before[None]))
-    assert rules(still, expected) == {"P6.tcp_turn"}
+    assert rules(still, expected) == {"P6.tcp_turn", "P6.commands"}
 
 
 @pytest.mark.parametrize("share", [1.01, 0.99])

@@ -2,13 +2,20 @@
 
 import pytest
 
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.world_view import WorldView
 
 MS = 1_000_000
 SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
+EXPECTED = ExpectedSettings(
+    execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
+    controller_mode="m", replan_lead_steps=3, late_chunk={},
+    force_limit_n={"approach": 20.0, "insert": 40.0},
+)  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
+    "arrival": 0,
 }  # fmt: skip
 
 
@@ -142,3 +149,43 @@ def test_another_mode_of_the_controller_objects_and_voids_what_was_seen_before(v
 def test_layers_and_reason_of_a_verdict_agree(view, layers, reason, found):
     m = {"t": 0, "chunk_id": "c", "layers": layers, "first_reason": reason}
     assert [rule for rule, _ in view.follow("candidate", m)] == found
+
+
+def test_what_was_here_at_an_event_is_void_though_it_was_seen_as_late(view):
+    """A force at the very time of the observation: the chunk was there, and another came after."""
+    void = {"reason": "force_event", "before_ns": 1000 * MS, "t": 1000 * MS}
+    assert list(view.follow("invalidate", void, 1)) == []
+    assert rules(view) == ["P1.void"] and rules(view, arrival=1) == []
+
+
+def test_a_person_who_clears_nothing_voids_no_chunk_that_is_here(view):
+    reset = {"event": "human_reset", "state": "run", "detail": "spotter", "t": 1000 * MS}
+    assert list(view.follow("supervisor", reset, 1)) == [] and rules(view) == []
+
+
+@pytest.mark.parametrize("event", ["force", "collision", "emergency_stop", "silence"])
+@pytest.mark.parametrize("state", ["run", "watchdog_hold"])
+def test_a_gate_that_says_why_it_stops_and_does_not_is_found(view, event, state):
+    message = {"event": event, "state": state, "detail": "", "t": 1100 * MS}
+    assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.gate"]
+    assert "P7.stop" in rules(view)
+
+
+@pytest.mark.parametrize(("event", "state"), [("watchdog", "protective stop"), ("resume", "run")])
+def test_a_supervisor_has_few_words(view, event, state):
+    message = {"event": event, "state": state, "detail": "", "t": 1100 * MS}
+    assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.words"]
+
+
+@pytest.mark.parametrize(("felt_n", "found"), [(40.0, []), (40.01, ["P7.force"])])
+def test_above_the_force_that_any_phase_bears_nothing_is_accepted(felt_n, found):
+    """A supervisor that is deaf says nothing; what was measured does."""
+    own, known = WorldView(EXPECTED), WorldView()
+    for view in (own, known):
+        view.fallback_hash = "f"
+        list(view.follow("active", {"checkpoint": "w", "sampler": "s"}))
+        list(view.follow("controller", {"mode": "m", "t": 0}))
+        observed(view, 1000)
+        assert list(view.follow("state", {"force_n": felt_n, "t": 1000 * MS})) == []
+    assert rules(own) == found and rules(known) == []
+    assert list(own.follow("state", {"force_n": 1.0, "t": 1050 * MS})) == [] and rules(own) == []

@@ -83,7 +83,7 @@ class StandInContext:
     """What the chunk was checked against, as claimed."""
 
     q_cmd: Array = field(default_factory=lambda: np.zeros(1))
-    q_cmd_history: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    q_cmd_history: Array = field(default_factory=lambda: np.zeros((2, 1)))
     q_meas: Array = field(default_factory=lambda: np.zeros(1))
     dq_meas: Array | None = None
     measured_at_s: float = 0.0

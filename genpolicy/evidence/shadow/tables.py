@@ -136,6 +136,7 @@ def checker_document(
         controller_mode=cell.controller_mode,
         replan_lead_steps=execution.replan_lead_steps,
         late_chunk=execution.late_by_phase,
+        force_limit_n=execution.force_limit_n,
     )
     motion = expected_motion(robot, seen)
     return checked(

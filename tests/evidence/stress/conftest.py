@@ -131,6 +131,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         controller_mode=CONTROLLER_MODE,
         replan_lead_steps=execution.replan_lead_steps,
         late_chunk=execution.late_by_phase,
+        force_limit_n=execution.force_limit_n,
     )
     setup = rollouts[0].setup if rollouts else None
     motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
