@@ -49,6 +49,10 @@ def test_an_adaptive_solver_is_held_against_the_counts_that_it_may_take(
         ladder, "reload/nfe.parquet",
         lambda f: f.assign(recorded=counted, counted=counted, expected=nearest, least=4, most=61),
     )  # fmt: skip
+    evidence.edit_document(
+        ladder, "reload/identity.json",
+        lambda d: [one["card"].update(evaluations="4 to 61") for one in d.values()] and None,
+    )  # fmt: skip
     for table in (MODES, EARLIER):
         evidence.edit_table(ladder, table, lambda f: f.assign(nfe=4 + 3 * (f["index"] % 20)))
     report = judge(ladder, "B")
