@@ -4,6 +4,8 @@ A card may name any hash; what lies in the checkpoint's folder has one. Every tr
 was trained is asked: a method of which only the best seed has rows was selected.
 """
 
+import contextlib
+
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.reproducibility.settings import GENERATORS, MODES, NFE, fixtures_of
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity
@@ -57,8 +59,11 @@ def _unasked(evidence: Evidence, candidate: str, trained: set[int]) -> list[str]
     asked = {
         "samples": set(fixtures_of(evidence, candidate)),
         "evaluations": set(evidence.of(NFE, NfeRow, candidate)["seed"]),
-        "modes": set(evidence.of(MODES, ModeRow, candidate)["seed"]),
+        "modes": trained,
     }
+    # Without any the questions about modes have no answer, and say so themselves.
+    with contextlib.suppress(MissingEvidenceError):
+        asked["modes"] = set(evidence.of(MODES, ModeRow, candidate)["seed"])
     return [
         f"seed: {name} are of {_listed(seeds)}, trained were {_listed(trained)}"
         for name, seeds in asked.items()
@@ -80,4 +85,4 @@ def evaluations_said(evidence: Evidence, candidate: str) -> str:
     pairs = set(zip(numbers(rows, "least"), numbers(rows, "most"), strict=True))
     if len(pairs) != 1:
         raise MissingEvidenceError(f"{NFE} allows {candidate} several counts of evaluations")
-    return " to ".join(f"{count:g}" for count in dict.fromkeys(next(iter(pairs))))
+    return " to ".join(f"{count:.0f}" for count in dict.fromkeys(next(iter(pairs))))

@@ -15,7 +15,7 @@ from gates.reproducibility.compute import cost_of, cost_said, miscounted
 from gates.reproducibility.files import evaluations_said, unlike_files
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, says_nothing, unrecorded
-from gates.reproducibility.matching import matched_by
+from gates.reproducibility.matching import matched_by, unsaid
 from gates.reproducibility.settings import (
     BROUGHT_FOLDER,
     COVERAGE,
@@ -53,7 +53,11 @@ def unmatched_keys(
             f"exception is written (gate_b.unmatched.{candidate}: owner, reason, expires)"
         )
         return Measured(1.0, caveat=text)
-    return unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
+    found = unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
+    if hidden := unsaid(evidence, candidate):
+        text = f"{', '.join(hidden)}: configured otherwise than the reference, and not listed"
+        return Measured((found.value or 0.0) + len(hidden), caveat=text)
+    return found
 
 
 @criterion(
@@ -231,8 +235,12 @@ def samples_difference(
 ) -> Measured:
     """Largest difference of a sample after reload, in its own unit."""
     rows = evidence.of(SAMPLES, SampleRow, candidate)
+    if rows.duplicated(["seed", "device", "row"]).any():
+        raise MissingEvidenceError(f"{SAMPLES} has a fixture of {candidate} twice")
     largest = float(np.abs(numbers(rows, "max_abs_difference")).max())
     unequal = int((rows["sha256_trained"] != rows["sha256_reloaded"]).sum())
+    if (rows[["sha256_trained", "sha256_reloaded"]] == "").any(axis=None) and largest == 0.0:
+        raise MissingEvidenceError("samples without a hash are said not to differ")
     if unequal and largest == 0.0:
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     seeds = rows["seed"].nunique()
@@ -269,6 +277,8 @@ def nfe_mismatch(evidence: Evidence, settings: ReproducibilitySettings, candidat
     recorded, counted, expected, least, most = (
         numbers(rows, name) for name in ("recorded", "counted", "expected", "least", "most")
     )
+    if not all(np.all(count >= 1) for count in (recorded, counted, least)):
+        raise MissingEvidenceError("a sample without a network evaluation was counted by nobody")
     if not np.all((least <= expected) & (expected <= most)):
         raise MissingEvidenceError("an expected count that its definition does not allow")
     difference = np.maximum(np.abs(recorded - counted), np.abs(expected - counted))

@@ -130,6 +130,27 @@ def test_all_that_is_not_pinned_is_counted(ladder):
     assert found.value == 4 and "checkpoint file" in found.caveat
 
 
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [(lambda f: f.assign(sha256_trained="", sha256_reloaded=""), "without a hash"),
+     (lambda f: f.assign(row=f["row"] // 2), "a fixture of flow twice")],
+)  # fmt: skip
+def test_samples_that_are_none_or_one_twice_are_no_measurement(ladder, change, why):
+    evidence.edit_table(ladder, "reload/samples.parquet", change)
+    with pytest.raises(MissingEvidenceError, match=why):
+        asked(ladder, samples_difference, "flow", gate="B")
+
+
+@pytest.mark.parametrize(
+    "counted",
+    [dict.fromkeys(("recorded", "counted", "expected", "least", "most"), 0), {"least": 0}],
+)
+def test_no_evaluation_is_no_count_that_agrees(ladder, counted):
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(**counted))
+    with pytest.raises(MissingEvidenceError, match="without a network evaluation"):
+        asked(ladder, nfe_mismatch, "flow", gate="B")
+
+
 def test_the_largest_difference_counts_whichever_sample_has_it(ladder):
     def differ(frame):
         rows = frame.index[frame["method"] == "flow"]
