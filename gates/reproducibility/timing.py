@@ -57,7 +57,7 @@ def latency_terms_missing(
     ]
     acted = {term for term, _, action in settings.term_deadlines if action in ACTIONS}
     idle = [term for term in TERMS if term not in acted]
-    owners = {term: set(part.str.strip()) for term, part in rows.groupby("component")["owner"]}
+    owners = {str(term): set(part.str.strip()) for term, part in rows.groupby("component")["owner"]}
     ownerless = [term for term, named in owners.items() if len(named) != 1 or "" in named]
     stated = [term for term in TERMS if term in declared and term not in missing]
     text = f"missing: {', '.join(missing)}; " if missing else ""
