@@ -13,7 +13,7 @@ from genpolicy.evidence.documents.given import TrainedConfig
 from genpolicy.evidence.rows.reproducibility import PARTS, UPDATE, ComputeRow
 
 COMPUTE = f"{RELOAD}/compute.parquet"
-TRUNK = "trunk"
+TRUNK, TOTAL = "trunk", "total"
 STOPS = "a number that was written before, no loss stops or selects"
 """The only stopping rule there is: training measures held-out loss, and does nothing by it."""
 
@@ -84,6 +84,11 @@ def miscounted(cost: Cost, config: TrainedConfig) -> list[str]:
         for part in PARTS
         if cost.parameters[part] != config.parameters.get(part)
     ]
+    total, said_in_all = sum(cost.parameters.values()), config.parameters.get(TOTAL)
+    if not found and total != said_in_all:
+        found.append(f"parameters of all parts: counted {total}, trained as {said_in_all}")
+    if not (cost.evaluation > 0 and cost.window > 0):
+        found.append("operations: none of an evaluation, or none of a window's training")
     for part in PARTS:
         counted, wrote = cost.operations[part], config.flops.get(part)
         # Products outside of layers (attention, in the trunk) are counted here alone.

@@ -104,6 +104,8 @@ def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Sett
     if len(times) == 0:
         raise MissingEvidenceError(f"{SWEEP} has no times of {row['method']}, {name}")
     seconds, tolerance = numbers(times, "seconds"), row["tolerance"]
+    if not np.all(seconds > 0.0):
+        raise MissingEvidenceError(f"{SWEEP} has {name} in no time")
     known = isinstance(tolerance, float) and bool(np.isfinite(tolerance))
     shares = {
         key: float(str(row[key]))
@@ -111,6 +113,8 @@ def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Sett
     }
     if not shares["coverage_lower"] <= shares["modes_covered_share"]:
         raise MissingEvidenceError(f"{COVERAGE} has {name} below the lower end of its interval")
+    if not np.all(np.isfinite(list(shares.values()))) and not int(str(row["nonfinite"])):
+        raise MissingEvidenceError(f"{COVERAGE} has {name} with what is no number")
     return Setting(
         name=name,
         sha256=str(row["sampler_sha256"]),

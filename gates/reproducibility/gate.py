@@ -12,14 +12,16 @@ from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility import conformance, convergence, modes, timing, variations
 from gates.reproducibility.compute import cost_of, cost_said, miscounted
+from gates.reproducibility.files import evaluations_said, unlike_files
 from gates.reproducibility.front import SWEEP
-from gates.reproducibility.identity import contradicted, unrecorded
-from gates.reproducibility.matching import matched_by
+from gates.reproducibility.identity import contradicted, says_nothing, unrecorded
+from gates.reproducibility.matching import matched_by, unsaid
 from gates.reproducibility.settings import (
     BROUGHT_FOLDER,
     COVERAGE,
     DENSITY,
     GENERATORS,
+    NFE,
     RELOAD,
     SAMPLES,
     ReproducibilitySettings,
@@ -51,7 +53,11 @@ def unmatched_keys(
             f"exception is written (gate_b.unmatched.{candidate}: owner, reason, expires)"
         )
         return Measured(1.0, caveat=text)
-    return unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
+    found = unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
+    if hidden := unsaid(evidence, candidate):
+        text = f"{', '.join(hidden)}: configured otherwise than the reference, and not listed"
+        return Measured((found.value or 0.0) + len(hidden), caveat=text)
+    return found
 
 
 @criterion(
@@ -104,19 +110,17 @@ def unpinned_items(
         "seed": entry.seed,
         "sampler": entry.sampler,
     }
-    missing = [name for name, pin in pins.items() if not pin]
+    missing = [name for name, pin in pins.items() if says_nothing(pin)]
     if candidate in settings.brought:
         return _unpinned_of_brought(evidence, settings, candidate, missing)
-    files = evidence.bind(
-        f"{GENERATORS}/{candidate}/seed_*/model.safetensors",
-        f"{GENERATORS}/{candidate}/seed_*/config.json",
-    )
-    if not any(file.endswith("model.safetensors") for file in files):
-        missing.append("checkpoint file")
+    missing += unlike_files(evidence, candidate, entry)
     if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
     config = _config(evidence, candidate)
-    missing += unrecorded(entry.card) + contradicted(entry, config)
+    missing += unrecorded(entry.card)
+    own = config.provenance.get("episodes_sha256") or _split(evidence)
+    counts = evaluations_said(evidence, candidate)
+    missing += contradicted(entry, config, split=own, evaluations=counts)
     missing += miscounted(cost_of(evidence, candidate, config), config)
     if entry.card.device != settings.device:
         missing.append(f"device: ran on {entry.card.device}, compute.device is {settings.device}")
@@ -148,8 +152,9 @@ def _unpinned_of_brought(
 
 
 def _split(evidence: Evidence) -> str:
-    """Of the audited dataset, whose manifest is bound already."""
-    return split_sha256(read_json(evidence.root / MANIFEST))
+    """Of the audited dataset, whose manifest is bound already; empty where it has none."""
+    manifest = read_json(evidence.root / MANIFEST)
+    return split_sha256(manifest) if "split" in manifest else ""
 
 
 def _brought(evidence: Evidence, candidate: str) -> Brought:
@@ -230,8 +235,12 @@ def samples_difference(
 ) -> Measured:
     """Largest difference of a sample after reload, in its own unit."""
     rows = evidence.of(SAMPLES, SampleRow, candidate)
+    if rows.duplicated(["seed", "device", "row"]).any():
+        raise MissingEvidenceError(f"{SAMPLES} has a fixture of {candidate} twice")
     largest = float(np.abs(numbers(rows, "max_abs_difference")).max())
     unequal = int((rows["sha256_trained"] != rows["sha256_reloaded"]).sum())
+    if (rows[["sha256_trained", "sha256_reloaded"]] == "").any(axis=None) and largest == 0.0:
+        raise MissingEvidenceError("samples without a hash are said not to differ")
     if unequal and largest == 0.0:
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     seeds = rows["seed"].nunique()
@@ -264,10 +273,12 @@ def _where_drawn(rows: pd.DataFrame, device: str) -> str:
 )
 def nfe_mismatch(evidence: Evidence, settings: ReproducibilitySettings, candidate: str) -> Measured:
     """Largest difference of counted network evaluations from recorded or expected ones."""
-    rows = evidence.of(f"{RELOAD}/nfe.parquet", NfeRow, candidate)
+    rows = evidence.of(NFE, NfeRow, candidate)
     recorded, counted, expected, least, most = (
         numbers(rows, name) for name in ("recorded", "counted", "expected", "least", "most")
     )
+    if not all(np.all(count >= 1) for count in (recorded, counted, least)):
+        raise MissingEvidenceError("a sample without a network evaluation was counted by nobody")
     if not np.all((least <= expected) & (expected <= most)):
         raise MissingEvidenceError("an expected count that its definition does not allow")
     difference = np.maximum(np.abs(recorded - counted), np.abs(expected - counted))

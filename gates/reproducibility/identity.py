@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,25 +13,44 @@ MAY_BE_NONE = ("eta", "tolerance")
 """Of samplers that have none."""
 NEEDS = {"eta": ("ddim",), "tolerance": ("bosh3",)}
 """Samplers that are another one without it."""
+HASH = re.compile(r"[0-9a-f]{64}")
+
+
+def says_nothing(value: object) -> bool:
+    """Whether an item is left blank: no text but spaces, and no number above zero."""
+    if isinstance(value, str):
+        return not value.strip()
+    if isinstance(value, list):
+        return not value or any(isinstance(one, str) and not one.strip() for one in value)
+    return not (isinstance(value, int | float) and 0.0 < value < math.inf)
 
 
 def unrecorded(card: IdentityCard) -> list[str]:
     """Items of the card that say nothing, by name."""
     items = {item.name: getattr(card, item.name) for item in dataclasses.fields(card)}
-    empty = [name for name, value in items.items() if name not in MAY_BE_NONE and not value]
+    empty = [
+        name for name, value in items.items() if name not in MAY_BE_NONE and says_nothing(value)
+    ]
+    if not says_nothing(card.selector_sha256) and not HASH.fullmatch(card.selector_sha256):
+        empty.append("selector_sha256")
     return empty + [
         name for name, samplers in NEEDS.items() if card.sampler in samplers and items[name] is None
     ]
 
 
-def contradicted(entry: CandidateIdentity, config: TrainedConfig) -> list[str]:
+def contradicted(
+    entry: CandidateIdentity, config: TrainedConfig, *, split: str, evaluations: str
+) -> list[str]:
     """Items in which the card and the checkpoint's own configuration differ, with both values.
 
     Args:
         entry: The candidate, with its card.
         config: Configuration of the first training seed, which is the one that is promoted.
+        split: Which episodes trained it, by hash.
+        evaluations: Network evaluations that were allowed where they were counted.
     """
     card, own = entry.card, dict(_as_trained(config))
+    own |= {"split": split, "evaluations": evaluations}
     for name in MAY_BE_NONE:
         if getattr(card, name) is not None:
             own[name] = config.sampler.get(name)
@@ -46,6 +66,7 @@ def contradicted(entry: CandidateIdentity, config: TrainedConfig) -> list[str]:
 
 def _as_trained(config: TrainedConfig) -> Mapping[str, Any]:
     horizons, sampler, rests_on = config.horizons, config.sampler, config.provenance
+    period_s = float(horizons.get("action_period_s", math.inf))
     return {
         "parameters": config.parameters.get("total"),
         "dataset": rests_on.get("dataset_manifest_sha256"),
@@ -54,7 +75,8 @@ def _as_trained(config: TrainedConfig) -> Mapping[str, Any]:
         "observation_horizon": horizons.get("observation_horizon"),
         "prediction_horizon": horizons.get("prediction_horizon"),
         "execution_horizon": horizons.get("execution_horizon"),
-        "control_rate_hz": 1.0 / float(horizons.get("action_period_s", math.inf)),
+        "control_rate_hz": 1.0 / period_s,
+        "invocation_rate_hz": 1.0 / (float(horizons.get("execution_horizon", math.inf)) * period_s),
         "sampler": sampler.get("name"),
         "sampler_steps": sampler.get("steps"),
         "batch_rows": sampler.get("batch_rows"),

@@ -31,7 +31,7 @@ TERMS = (
 )
 MEASURED_HERE = ("preprocess", "encode", "sample", "select", "project")
 INVOCATION = ["run", "process", "repeat"]
-COLD = "cold"
+COLD, WARM = "cold", "warm"
 MEDIAN, P95 = 0.5, 0.95
 MILLI = 1e3
 

@@ -17,6 +17,7 @@ RELOAD = "artifacts/reload"
 SAMPLES = f"{RELOAD}/samples.parquet"
 COVERAGE = f"{RELOAD}/coverage.parquet"
 MODES = f"{RELOAD}/modes.parquet"
+NFE = f"{RELOAD}/nfe.parquet"
 MODES_EARLIER = f"{RELOAD}/modes_earlier.parquet"
 DENSITY = f"{RELOAD}/density.parquet"
 GENERATORS = "artifacts/train_generators"
@@ -41,7 +42,7 @@ class Unmatched(StrictModel):
     """
 
     owner: Owner
-    reason: str = Field(min_length=1)
+    reason: str = Field(pattern=r"\S")
     expires: str = Field(pattern=r"^\d{4}-\d{2}-\d{2}$")
 
     @field_validator("expires")
@@ -116,7 +117,7 @@ def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     Raises:
         MissingEvidenceError: None, or several of a sampler that always takes the same.
     """
-    rows = evidence.of(f"{RELOAD}/nfe.parquet", NfeRow, candidate)
+    rows = evidence.of(NFE, NfeRow, candidate)
     recorded, least, most = (numbers(rows, name) for name in ("recorded", "least", "most"))
     if np.all(least < most):
         return float(least.min()), float(most.max())

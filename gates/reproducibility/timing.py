@@ -7,10 +7,12 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.reproducibility.contention import Ends, running, waited_share, weigh
 from gates.reproducibility.latency_budget import (
+    COLD,
     LATENCY,
     MEASURED_HERE,
     P95,
     TERMS,
+    WARM,
     spans_of_processes,
 )
 from gates.reproducibility.settings import ReproducibilitySettings
@@ -27,6 +29,9 @@ ACTIONS = (
 DECLARED = "declared, not measured"
 """Said of latency terms that somebody wrote down."""
 
+KINDS = {"component": TERMS, "temperature": (COLD, WARM), "source": ("measured", "declared")}
+"""What the rows of `latency.parquet` may be of."""
+
 
 @criterion(
     "<=",
@@ -37,11 +42,14 @@ DECLARED = "declared, not measured"
 def latency_terms_missing(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Terms that are neither measured nor declared, or for which nobody declared an action."""
+    """Terms neither measured nor declared, of no single owner, or without a declared action."""
     rows = _latency(evidence, candidate)
-    known = rows[np.isfinite(rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan))]
-    measured = set(known.loc[known["source"] == "measured", "component"])
-    declared = sorted(set(known["component"]) - measured)
+    seconds = rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan)
+    taken = (rows["source"] == "measured").to_numpy()
+    measured = set(rows.loc[taken & np.isfinite(seconds), "component"])
+    # Of a term that was written down every draw is: one that is none was written by nobody.
+    wrong = set(rows.loc[~taken & ~(np.isfinite(seconds) & (seconds >= 0.0)), "component"])
+    declared = sorted(set(rows.loc[~taken, "component"]) - wrong - measured)
     missing = [
         term
         for term in TERMS
@@ -49,16 +57,29 @@ def latency_terms_missing(
     ]
     acted = {term for term, _, action in settings.term_deadlines if action in ACTIONS}
     idle = [term for term in TERMS if term not in acted]
+    owners = {str(term): set(part.str.strip()) for term, part in rows.groupby("component")["owner"]}
+    ownerless = [term for term, named in owners.items() if len(named) != 1 or "" in named]
     stated = [term for term in TERMS if term in declared and term not in missing]
     text = f"missing: {', '.join(missing)}; " if missing else ""
     text += f"{len(stated)} of {len(TERMS)} terms {DECLARED}: {', '.join(stated) or 'none'}"
     if idle:
         text += f"; nothing is done where these take too long: {', '.join(idle)}"
-    return Measured(float(len({*missing, *idle})), caveat=text)
+    if ownerless:
+        text += f"; not one owner answers for: {', '.join(ownerless)}"
+    return Measured(float(len({*missing, *idle, *ownerless})), caveat=text)
 
 
 def _latency(evidence: Evidence, candidate: str) -> pd.DataFrame:
-    return evidence.of(LATENCY, LatencyRow, candidate)
+    """Its rows, of the terms, temperatures and sources that there are.
+
+    Raises:
+        MissingEvidenceError: One of another kind, which no sum would hold.
+    """
+    rows = evidence.of(LATENCY, LatencyRow, candidate)
+    for column, known in KINDS.items():
+        if others := sorted(set(rows[column]) - set(known)):
+            raise MissingEvidenceError(f"{LATENCY} has a {column} {others[0]!r} that is none")
+    return rows
 
 
 def _ratio_of_runs(
@@ -89,6 +110,8 @@ def _compared(
     rows: pd.DataFrame, temperature: str, confidence: float
 ) -> tuple[Ends, tuple[Array, Array]]:
     """Slower over faster run, and what an invocation takes in each process of either, s."""
+    if _repeats(rows, COLD) > _repeats(rows, WARM):
+        raise MissingEvidenceError("more cold than warm invocations: they stand for each other")
     spans = spans_of_processes(rows, temperature)
     if sorted(spans) != [1, 2] or len({len(found) for found in spans.values()}) != 1:
         raise MissingEvidenceError("two runs of as many processes each are needed")
@@ -99,6 +122,12 @@ def _compared(
     # Slower over faster: what stands on both sides of 1 may be none.
     ends = (max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower))
     return Ends(ends[0], max(ratio, 1.0 / ratio), ends[1]), (first, second)
+
+
+def _repeats(rows: pd.DataFrame, temperature: str) -> int:
+    """Invocations of a temperature in one process."""
+    own = rows[(rows["source"] == "measured") & (rows["temperature"] == temperature)]
+    return int(own["repeat"].nunique())
 
 
 def _limit(settings: ReproducibilitySettings, name: str) -> float | None:
@@ -178,6 +207,8 @@ def _held(
     high = rows[rows["level"] == P95]
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
         raise MissingEvidenceError(f"{method}: the p95 of several processes of both runs is needed")
+    if longer:
+        _require_every_process(evidence, method, high)
     pair = _times(high, "measured_s", "drawn_s", method)
     wall = _ratio(pair, longer=longer, confidence=settings.confidence)
     without = share = None
@@ -195,6 +226,19 @@ def _held(
     )
     counted = f"{len(high)} processes"
     return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
+
+
+def _require_every_process(evidence: Evidence, method: str, high: pd.DataFrame) -> None:
+    """The model was held against every process that was timed, once.
+
+    Raises:
+        MissingEvidenceError: One was left out, or stands there twice.
+    """
+    rows = _latency(evidence, method)
+    timed = rows.loc[rows["source"] == "measured", ["run", "process"]].drop_duplicates()
+    held = list(high[["run", "process"]].itertuples(index=False, name=None))
+    if sorted(held) != sorted(timed.itertuples(index=False, name=None)):
+        raise MissingEvidenceError(f"{method}: {MODEL} does not hold each timed process once")
 
 
 def _times(rows: pd.DataFrame, measured: str, drawn: str, method: str) -> tuple[Array, Array]:

@@ -82,6 +82,7 @@ from genpolicy.evidence.rows.stress import (
 )
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS as ON_THE_WAY
 from genpolicy.evidence.shadow.stop_mutants import DEAF
+from genpolicy.evidence.split import split_sha256
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.feasibility.checks import CHECKS as FEASIBILITY_CHECKS
 from genpolicy.integrity.documents import canonical_json
@@ -114,6 +115,9 @@ INVOCATIONS = 20
 OF_BROUGHT = {"B": {"conformance"}, "C": {"changed_answers"}, "D": {"changed_answers"}}
 """Criteria that are asked of those only who were brought; nobody is, here."""
 UPDATES = 4000
+SPLIT = {"split": {"rule": "episodes", "sha256": "5" * 64}}
+CONFIG = b"{}\n"
+"""Configuration file of every checkpoint, of which nothing is read here but its hash."""
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -534,7 +538,7 @@ def _dataset(root: Path) -> None:
     training = [row for row in frames if row["episode_uuid"] in ("e0", "e1")]
     statistics = {name: _extremes([row[name] for row in training]) for name in
                   ("observation", "action")}  # fmt: skip
-    manifest = {"schema_version": 1, "normalisation": statistics}
+    manifest = {"schema_version": 1, "normalisation": statistics, **SPLIT}
     document(root, "ingest/manifest.json", manifest)
     table(
         root,
@@ -965,7 +969,7 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
         folder = root / "artifacts" / stage / method / "seed_0"
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.safetensors").write_bytes(method.encode())
-        (folder / "config.json").write_bytes(b"{}\n")
+        (folder / "config.json").write_bytes(CONFIG)
         given = {"episodes": ["e0", "e1"], "validation_episodes": ["e2"]}
         document(root, f"{stage}/{method}/seed_0/training.json", given)
         table(root, f"{stage}/{method}/seed_0/validation.parquet", ValidationRow, validation())
@@ -1197,9 +1201,9 @@ def _reload(root: Path) -> None:
         "reload/identity.json",
         {
             m: {
-                "checkpoint": hashlib.sha256(m.encode()).hexdigest(),
-                "checkpoints": [hashlib.sha256(m.encode()).hexdigest()],
-                "config": ["c"],
+                "checkpoint": checkpoint_sha256(m.encode()),
+                "checkpoints": [checkpoint_sha256(m.encode())],
+                "config": [hashlib.sha256(CONFIG).hexdigest()],
                 "dataset": hashlib.sha256(manifest).hexdigest(),
                 "normalisation": "n",
                 "seed": [0],
@@ -1214,15 +1218,21 @@ def _reload(root: Path) -> None:
     )
 
 
+def checkpoint_sha256(weights: bytes) -> str:
+    """Identity of a checkpoint with these weights and the configuration of all."""
+    parts = [hashlib.sha256(part).hexdigest() for part in (weights, CONFIG)]
+    return hashlib.sha256("".join(f"{part}\n" for part in parts).encode()).hexdigest()
+
+
 def _identity_card(dataset: str) -> dict[str, Any]:
     """Of the configuration that `_matched` writes."""
     return {
         "architecture": "mlp encoder", "parameters": 100, "training_seeds": ["0"],
-        "dataset": dataset, "split": "c" * 64, "action_semantics": "a" * 64,
+        "dataset": dataset, "split": split_sha256(SPLIT), "action_semantics": "a" * 64,
         "observation_semantics": "b" * 64, "observation_horizon": 2, "prediction_horizon": 16,
         "execution_horizon": 8, "control_rate_hz": 20.0, "invocation_rate_hz": 2.5,
         "deadline_s": 0.15, "path": "straight", "sampler": "direct", "sampler_steps": 1,
-        "eta": None, "tolerance": None, "evaluations": "1", "precision": "float32",
+        "eta": None, "tolerance": None, "evaluations": "8", "precision": "float32",
         "device": "cpu", "threads": 1, "cpu_capability": "AVX2", "warm_up": 10, "batch_rows": 16,
         "candidates": 4, "selector": "first_admissible", "selector_owner": "model",
         "selector_sha256": "d" * 64,

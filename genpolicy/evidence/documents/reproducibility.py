@@ -40,7 +40,7 @@ class IdentityCard:
         candidates: Drawn by one invocation.
         selector: Rule by which one of them is proposed.
         selector_owner: Who answers for the rule.
-        selector_sha256: The file that holds the rule.
+        selector_sha256: The file that holds the rule, with what the rule reads of the settings.
     """
 
     architecture: str

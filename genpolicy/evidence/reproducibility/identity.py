@@ -113,11 +113,14 @@ def card_of(
 
 
 def rule_sha256(joining: JoiningSettings) -> str:
-    """The file that holds the rule, or of both that do."""
+    """The file that holds the rule; of a rule that joins chunks both files, and what it reads.
+
+    One file holds several rules, so that without its name and numbers two would be one.
+    """
     own = sha256_file(Path(selector.__file__))
     if joining.rule == REPLACE:
         return own
-    return sha256_bytes((own + sha256_file(Path(votes.__file__))).encode())
+    return sha256_bytes((own + sha256_file(Path(votes.__file__)) + joining.said()).encode())
 
 
 def _architecture(config: CheckpointConfig) -> str:

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from genpolicy.evidence.reproducibility.identity import _path
+from genpolicy.candidates.joining import READS, JoiningSettings
+from genpolicy.evidence.reproducibility.identity import _path, rule_sha256
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.settings import HeadConfig, SamplerConfig
 
@@ -15,6 +16,17 @@ SAID = {
     "flow": ("straight path from Gaussian noise", "velocity"),
     "flow_policy": ("consistent in 3 segments",),
 }
+
+
+def test_no_two_rules_have_one_hash_and_what_a_rule_does_not_read_changes_none():
+    """Most of them stand in one file."""
+    plain = {rule: rule_sha256(JoiningSettings(rule=rule)) for rule in READS}
+    assert len({*plain.values()}) == len(READS)
+    other = {"decay": 0.5, "newest": 0.5, "guidance": 2.0}
+    for rule, read in READS.items():
+        for name, value in other.items():
+            changed = rule_sha256(JoiningSettings(rule=rule, **{name: value}))
+            assert (changed == plain[rule]) is (name not in read), (rule, name)
 
 
 @pytest.mark.parametrize("method", list(METHODS))

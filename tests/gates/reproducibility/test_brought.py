@@ -24,7 +24,6 @@ ANSWERED = {
     "episodes": 40, "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
     "counts_evaluations": True, "most_candidates": 4, "findings": FINDINGS,
 }  # fmt: skip
-SPLIT = {"split": {"rule": "episodes", "sha256": "5" * 64}}
 EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}
 ENTRY = "own/flow.yaml"
 
@@ -70,13 +69,13 @@ def split(root):
     """Let the dataset have a split: its hash is another one then, wherever it is named."""
     place = root / "artifacts"
     before = sha256_file(place / "ingest/manifest.json")
-    evidence.edit_document(root, "ingest/manifest.json", lambda found: found.update(SPLIT))
+    evidence.edit_document(root, "ingest/manifest.json", lambda found: found.update(evidence.SPLIT))
     now = sha256_file(place / "ingest/manifest.json")
     for path in (place / "reload/identity.json", place / "train_generators/matched.json"):
         path.write_text(path.read_text().replace(before, now))
     evidence.edit_document(
         root, "reload/identity.json",
-        lambda found: found["flow"]["card"].update(split=split_sha256(SPLIT)),
+        lambda found: found["flow"]["card"].update(split=split_sha256(evidence.SPLIT)),
     )  # fmt: skip
 
 
@@ -201,6 +200,7 @@ def test_an_answer_that_is_none_counts_where_nobody_sees_weights(ladder):
         ({**EXCEPTION, "expires": "soon"}, "expires"),
         ({**EXCEPTION, "owner": "nobody"}, "owner"),
         ({**EXCEPTION, "reason": ""}, "reason"),
+        ({**EXCEPTION, "reason": "  "}, "reason"),
     ],
 )
 def test_an_exception_names_owner_reason_and_day(ladder, exception, told):

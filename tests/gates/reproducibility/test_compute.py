@@ -59,14 +59,34 @@ def test_products_outside_of_layers_contradict_nothing(ladder):
 
 
 def test_a_part_that_training_does_not_name_is_not_pinned(ladder):
-    cost = Cost(dict.fromkeys(PARTS, 1), dict.fromkeys(PARTS, 0), 0, 9, 1, 1)
+    cost = Cost(dict.fromkeys(PARTS, 1), {**dict.fromkeys(PARTS, 0), "head": 1}, 0, 9, 1, 1)
     config = SimpleNamespace(
-        parameters=dict.fromkeys(PARTS, 1), training_only_parameters=0, flops={"head": 0}
+        parameters={**dict.fromkeys(PARTS, 1), "total": 3},
+        training_only_parameters=0,
+        flops={"head": 1},
     )
     assert miscounted(cost, config) == [
         "operations of encoder: counted 0, trained as None",
         "operations of trunk: counted 0, trained as None",
     ]
+
+
+def test_parts_that_are_not_the_whole_are_not_pinned(ladder):
+    """Both count a trunk of ten, and the budget is held against a total of a hundred."""
+
+    def smaller(document):
+        document["methods"]["flow"]["config"]["parameters"]["trunk"] = 10
+
+    evidence.edit_document(ladder, "train_generators/matched.json", smaller)
+    edit(ladder, "trunk", "parameters", 10)
+    found = asked(ladder, unpinned_items, "flow", gate="B")
+    assert found.caveat == "parameters of all parts: counted 30, trained as 100"
+
+
+def test_a_training_without_an_operation_was_not_counted(ladder):
+    edit(ladder, "update", "operations", 0)
+    found = asked(ladder, unpinned_items, "flow", gate="B")
+    assert found.value == 1.0 and "none of a window's training" in found.caveat
 
 
 def test_a_training_seed_that_nobody_counted_is_missing(ladder):

@@ -137,3 +137,17 @@ def test_a_setting_that_covers_nothing_has_its_lower_end_there(repo):
     evidence.edit_table(repo, COVERAGE, lambda f: f.assign(**none))
     found = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
     assert {(one.coverage, one.coverage_lower) for one in found} == {(0.0, 0.0)}
+
+
+@pytest.mark.parametrize("column", ["chunk_error", "jerk_p95_m_s3", "modes_covered_share"])
+def test_what_is_no_number_beats_nobody_and_is_not_undominated(ladder, column):
+    """Nothing is smaller than a NaN, so that it would stand on the front for ever."""
+    evidence.edit_table(ladder, COVERAGE, cells(column, math.nan))
+    with pytest.raises(MissingEvidenceError):
+        settings_of(Evidence(ladder), "flow", confidence=CONFIDENCE)
+
+
+def test_a_setting_in_no_time_was_not_timed(ladder):
+    evidence.edit_table(ladder, SWEEP.removeprefix("artifacts/"), cells("seconds", 0.0))
+    with pytest.raises(MissingEvidenceError, match="in no time"):
+        settings_of(Evidence(ladder), "flow", confidence=CONFIDENCE)

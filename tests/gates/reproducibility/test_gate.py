@@ -49,6 +49,10 @@ def test_an_adaptive_solver_is_held_against_the_counts_that_it_may_take(
         ladder, "reload/nfe.parquet",
         lambda f: f.assign(recorded=counted, counted=counted, expected=nearest, least=4, most=61),
     )  # fmt: skip
+    evidence.edit_document(
+        ladder, "reload/identity.json",
+        lambda d: [one["card"].update(evaluations="4 to 61") for one in d.values()] and None,
+    )  # fmt: skip
     for table in (MODES, EARLIER):
         evidence.edit_table(ladder, table, lambda f: f.assign(nfe=4 + 3 * (f["index"] % 20)))
     report = judge(ladder, "B")
@@ -124,6 +128,27 @@ def test_all_that_is_not_pinned_is_counted(ladder):
         file.unlink()
     found = asked(ladder, unpinned_items, "flow", gate="B")
     assert found.value == 4 and "checkpoint file" in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [(lambda f: f.assign(sha256_trained="", sha256_reloaded=""), "without a hash"),
+     (lambda f: f.assign(row=f["row"] // 2), "a fixture of flow twice")],
+)  # fmt: skip
+def test_samples_that_are_none_or_one_twice_are_no_measurement(ladder, change, why):
+    evidence.edit_table(ladder, "reload/samples.parquet", change)
+    with pytest.raises(MissingEvidenceError, match=why):
+        asked(ladder, samples_difference, "flow", gate="B")
+
+
+@pytest.mark.parametrize(
+    "counted",
+    [dict.fromkeys(("recorded", "counted", "expected", "least", "most"), 0), {"least": 0}],
+)
+def test_no_evaluation_is_no_count_that_agrees(ladder, counted):
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(**counted))
+    with pytest.raises(MissingEvidenceError, match="without a network evaluation"):
+        asked(ladder, nfe_mismatch, "flow", gate="B")
 
 
 def test_the_largest_difference_counts_whichever_sample_has_it(ladder):

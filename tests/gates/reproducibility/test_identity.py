@@ -4,6 +4,7 @@ import dataclasses
 import json
 
 import evidence
+import pandas as pd
 import pytest
 from asked import asked
 
@@ -63,7 +64,8 @@ def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item
     [("parameters", 99), ("training_seeds", ["1"]), ("dataset", "e" * 64),
      ("action_semantics", "e" * 64), ("observation_semantics", "e" * 64),
      ("observation_horizon", 3), ("prediction_horizon", 17), ("execution_horizon", 9),
-     ("control_rate_hz", 10.0), ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
+     ("control_rate_hz", 10.0), ("invocation_rate_hz", 20.0), ("split", "e" * 64),
+     ("evaluations", "4"), ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
 )  # fmt: skip
 def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, value):
     say(ladder, item, value)
@@ -71,19 +73,86 @@ def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, val
     assert found.value == 1 and found.caveat.startswith(f"{item}: {value}, trained as ")
 
 
+def trained_twice(root):
+    """`flow` has a second training, and every table has its rows."""
+    folder = root / "artifacts/train_generators/flow/seed_1"
+    folder.mkdir()
+    (folder / "model.safetensors").write_bytes(b"again")
+    (folder / "config.json").write_bytes(evidence.CONFIG)
+    for table in ("samples", "variations", "compute", "nfe", "modes", "modes_earlier"):
+        evidence.edit_table(
+            root, f"reload/{table}.parquet",
+            lambda f: pd.concat([f, f[f["method"] == "flow"].assign(seed=1)], ignore_index=True),
+        )  # fmt: skip
+    evidence.edit_document(root, IDENTITY, two)
+
+
+def two(document, seeds=(0, 7), said=("0", "7")):
+    weights = (b"flow", b"again")
+    document["flow"] |= {
+        "seed": list(seeds), "config": document["flow"]["config"][:1] * 2,
+        "checkpoints": [evidence.checkpoint_sha256(each) for each in weights],
+    }  # fmt: skip
+    document["flow"]["card"]["training_seeds"] = list(said)
+
+
 def test_several_training_seeds_are_all_on_the_card(ladder):
     """`matched.json` holds the configuration of the first, which is the one that is promoted."""
-
-    def two(document, seeds=(0, 7), said=("0", "7")):
-        document["flow"] |= {"seed": list(seeds), "checkpoints": ["x", "y"], "config": ["c", "d"]}
-        document["flow"]["card"]["training_seeds"] = list(said)
-
-    evidence.edit_document(ladder, IDENTITY, two)
+    trained_twice(ladder)
     assert unpinned(ladder).value == 0
     evidence.edit_document(ladder, IDENTITY, lambda d: two(d, said=("0",)))
     assert "training_seeds" in unpinned(ladder).caveat
     evidence.edit_document(ladder, IDENTITY, lambda d: two(d, seeds=(7, 0), said=("7", "0")))
     assert unpinned(ladder).caveat == "seed: [7, 0], trained as 0 first"
+
+
+@pytest.mark.parametrize(
+    ("tables", "name"),
+    [(("samples", "variations", "compute"), "samples"), (("nfe",), "evaluations"),
+     (("modes",), "modes")],
+)  # fmt: skip
+def test_a_training_of_which_a_table_has_no_rows_is_not_left_out(ladder, tables, name):
+    """Whoever shows the best of two trainings has selected it."""
+    trained_twice(ladder)
+    for table in tables:
+        evidence.edit_table(ladder, f"reload/{table}.parquet", lambda f: f[f["seed"] == 0])
+    found = unpinned(ladder)
+    assert found.value == 1 and found.caveat == f"seed: {name} are of 0, trained were 0, 1"
+
+
+def test_a_training_that_lies_there_and_is_not_on_the_card_is_named(ladder):
+    folder = ladder / "artifacts/train_generators/flow/seed_1"
+    folder.mkdir()
+    (folder / "model.safetensors").write_bytes(b"the other one")
+    (folder / "config.json").write_bytes(evidence.CONFIG)
+    found = unpinned(ladder)
+    assert "checkpoint: not the files of its trainings" in found.caveat
+    assert "seed: modes are of 0, trained were 0, 1" in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [({"checkpoint": "e" * 64}, "checkpoint: not the files"),
+     ({"checkpoint": "e" * 64, "checkpoints": ["e" * 64]}, "checkpoint: not the files"),
+     ({"config": ["e" * 64]}, "config: not the files"),
+     ({"checkpoint": " "}, "checkpoint"), ({"config": [" "]}, "config"),
+     ({"sampler": " "}, "sampler")],
+)  # fmt: skip
+def test_a_pin_that_is_no_file_of_the_candidate_pins_nothing(ladder, change, said):
+    evidence.edit_document(ladder, IDENTITY, lambda d: d["flow"].update(change))
+    found = unpinned(ladder)
+    assert found.value >= 1 and found.caveat.startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("item", "value"),
+    [("selector", "  "), ("path", "\n"), ("selector_sha256", " "), ("selector_sha256", "none"),
+     ("deadline_s", -1.0), ("training_seeds", [" "])],
+)  # fmt: skip
+def test_an_item_that_is_blank_or_no_quantity_is_not_recorded(ladder, item, value):
+    say(ladder, item, value)
+    found = unpinned(ladder)
+    assert found.value >= 1 and item in found.caveat
 
 
 def test_a_card_without_an_item_is_missing_evidence(ladder):

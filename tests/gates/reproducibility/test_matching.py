@@ -2,9 +2,11 @@
 
 import evidence
 import pytest
+from asked import asked
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
+from gates.reproducibility.gate import unmatched_keys
 from gates.reproducibility.matching import matched_by, pairs
 
 BY_CONVERGENCE = "Equal convergence (the loss of both falls by 0.1 at most over the last quarter):"
@@ -103,3 +105,37 @@ def test_without_a_limit_nobody_says_what_is_done(ladder):
         ladder, lambda params: params["gate_b"]["limits"]["model"].pop("baseline_fall_upper")
     )
     assert "no limit says what is done" in said_of(ladder)
+
+
+def _configured(ladder, change):
+    evidence.edit_document(
+        ladder, "train_generators/matched.json", lambda d: change(d, d["methods"]["flow"]["config"])
+    )
+    return asked(ladder, unmatched_keys, "flow", gate="B")
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value"),
+    [("training", "learning_rate", 9.0), ("normalisation", "action", {"minimum": [5.0]}),
+     ("horizons", "execution_horizon", 4)],
+)  # fmt: skip
+def test_a_setting_that_differs_and_is_not_listed_counts_by_name(ladder, part, key, value):
+    """The list is what training says of the configurations; they stand beside it."""
+    found = _configured(ladder, lambda d, own: own[part].update({key: value}))
+    assert found.value >= 1 and f"{part}.{key}" in found.caveat
+
+
+def test_what_is_listed_by_definition_or_a_count_is_no_setting_that_differs(ladder):
+    def change(document, own):
+        own["parameters"]["head"] = 11
+        own["provenance"]["episodes_sha256"] = "e" * 64
+        own["horizons"]["prediction_horizon"] = 1
+        document["one_mode_keys"] = ["provenance.episodes_sha256"]
+        document["single_action_keys"] = ["horizons.prediction_horizon"]
+
+    assert _configured(ladder, change).value == 0
+
+
+def test_without_the_reference_nothing_is_matched(ladder):
+    with pytest.raises(MissingEvidenceError, match="has no entry of diffusion"):
+        _configured(ladder, lambda d, own: d["methods"].pop("diffusion") and None)

@@ -180,6 +180,74 @@ def test_a_term_that_is_not_known_is_missing_and_never_zero(ladder, term):
     assert found.value == 1 and found.caveat.startswith(f"missing: {term}; ")
 
 
+@pytest.mark.parametrize("seconds", [-0.001, np.nan, np.inf])
+def test_a_term_of_which_one_draw_is_no_duration_was_not_declared(ladder, seconds):
+    def one(frame):
+        return (frame["component"] == "queue") & (frame["repeat"] == 3)
+
+    evidence.edit_table(ladder, LATENCY, cells("seconds", seconds, where=one))
+    found = asked(ladder, latency_terms_missing, "flow", gate="B")
+    assert found.value == 1 and found.caveat.startswith("missing: queue; ")
+    evidence.edit_table(ladder, LATENCY, cells("seconds", 0.0, where=one))
+    assert asked(ladder, latency_terms_missing, "flow", gate="B").value == 0
+
+
+@pytest.mark.parametrize(("owner", "repeats"), [(" ", 8), ("safety", 4)])
+def test_one_owner_answers_for_a_term(ladder, owner, repeats):
+    """Nobody does, or two of whom each thinks that it is the other."""
+
+    def some(frame):
+        return (frame["component"] == "encode") & (frame["repeat"] < repeats)
+
+    evidence.edit_table(ladder, LATENCY, cells("owner", owner, where=some))
+    found = asked(ladder, latency_terms_missing, "flow", gate="B")
+    assert found.value == 1 and found.caveat.endswith("; not one owner answers for: encode")
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [("component", "unwrap"), ("temperature", "hot"), ("source", "guessed")]
+)
+def test_times_that_no_sum_would_hold_are_no_evidence(ladder, column, value):
+    """A twelfth term would be neither in an invocation nor in the sum of the terms."""
+
+    def further(frame):
+        own = frame[frame["component"] == "sample"]
+        return evidence.pd.concat([frame, own.assign(**{column: value, "seconds": 5.0})])
+
+    evidence.edit_table(ladder, LATENCY, further)
+    report = judge(ladder, "B")
+    for name in ("latency_terms_missing", *RATIOS.values()):
+        found = found_in(report, name)[0]
+        assert found.measured is None and repr(value) in found.caveat
+
+
+def test_cold_and_warm_do_not_stand_for_each_other(ladder):
+    """A process has few cold invocations, and warm ones in plenty."""
+
+    def swapped(frame):
+        few = frame[(frame["temperature"] == "warm") | (frame["repeat"] < 2)]
+        return few.assign(temperature=few["temperature"].map({"cold": "warm", "warm": "cold"}))
+
+    evidence.edit_table(ladder, LATENCY, swapped)
+    report = judge(ladder, "B")
+    for name in RATIOS.values():
+        found = found_in(report, name)[0]
+        assert found.measured is None and "more cold than warm" in found.caveat
+
+
+@pytest.mark.parametrize("twice", [False, True])
+def test_a_process_that_the_model_was_not_held_against_is_not_left_out(ladder, twice):
+    """Four of six would do for an interval; the two that were slowest are not to be dropped."""
+
+    def change(frame):
+        kept = frame[frame["process"] < 3]
+        return evidence.pd.concat([kept, kept[kept["process"] == 1]]) if twice else kept
+
+    evidence.edit_table(ladder, MODEL, change)
+    with pytest.raises(MissingEvidenceError, match="does not hold each timed process once"):
+        asked(ladder, latency_model_ratio_upper, "flow", gate="B")
+
+
 def test_a_term_that_is_measured_here_may_not_be_declared(ladder):
     evidence.edit_table(ladder, LATENCY, cells("source", "declared"))
     found = asked(ladder, latency_terms_missing, "flow", gate="B")
