@@ -112,10 +112,10 @@ def knows(context: object, before: int) -> bool:
     assumes nothing, and asks nothing.
     """
     try:
-        told = np.shape(getattr(context, "q_cmd_history", None))
+        told = np.asarray(getattr(context, "q_cmd_history", None), dtype=float)
     except (TypeError, ValueError):
-        told = ()
-    return (told[0] if told else 0) >= min(before, SEAM_COMMANDS)
+        return before <= 0
+    return (len(told) if told.ndim else 0) >= min(before, SEAM_COMMANDS)
 
 
 def bytes_of(values: object) -> bytes:

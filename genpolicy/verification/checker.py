@@ -323,7 +323,7 @@ class _Session:
         arrival, reason = m["arrival"], str(m["reason"]) if kind == "discard" else None
         if m.get("at") == "arrival":
             self.report.chunks += 1
-            for sentence in self.balance.refused(arrival, m["rows"], reason):
+            for sentence in self.balance.refused(arrival, m["rows"], str(reason)):
                 self.flag("conservation", sentence)
         elif arrival in self.open:
             if self.open.pop(arrival)["chunk_id"] != m["chunk_id"]:
