@@ -7,9 +7,9 @@ becomes the `materials` of its report, and what one criterion read becomes its `
 import contextlib
 import dataclasses
 import typing
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import pandas as pd
@@ -33,6 +33,7 @@ from genpolicy.integrity.tables import table_of
 
 Array = NDArray[np.float64]
 Content = TypeVar("Content")
+Made = TypeVar("Made")
 
 
 class MissingEvidenceError(Exception):
@@ -55,6 +56,8 @@ class Evidence:
         self._frames: dict[tuple[str, bool], pd.DataFrame] = {}
         self._documents: dict[str, Any] = {}
         self._touched: dict[str, None] = {}
+        self._whole: set[tuple[str, type]] = set()
+        self._made: dict[Hashable, tuple[Any, list[str]]] = {}
 
     @property
     def materials(self) -> dict[str, str]:
@@ -71,6 +74,20 @@ class Evidence:
         finally:
             paths += self._touched
             self._touched = {**before, **self._touched}
+
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """What is made of this evidence and nothing else: once for each key, then given again.
+
+        What it read counts as read by everyone who asks. Where `make` raises, nothing is kept. Do
+        not write into what is given.
+        """
+        if key not in self._made:
+            with self.recorded() as paths:
+                made = make()
+            self._made[key] = made, paths
+        found, read = self._made[key]
+        self._touched |= dict.fromkeys(read)
+        return cast(Made, found)
 
     def rows(self, path: str, row: type, *, lists: bool = False) -> pd.DataFrame:
         """Rows of a table of the class `row`, at least one.
@@ -124,6 +141,8 @@ class Evidence:
     def _known(self, path: str, row: type) -> pa.Table:
         """The table with the columns of its class: an unknown one refuses, by name."""
         table = self._table(path)
+        if (path, row) in self._whole:
+            return table
         if unknown_columns(row, table.column_names):
             check_columns(row, table.column_names, where=path)
         absent = missing_columns(row, table.column_names)
@@ -131,6 +150,7 @@ class Evidence:
             raise MissingEvidenceError(f"{path} has no column {', '.join(absent)}")
         texts = {name: kind for name, kind in _filled(row).items() if kind is not float}
         _require_filled(table, texts, path)
+        self._whole.add((path, row))
         return table
 
     def document(self, folder: str, of: Document[Content]) -> Content:
@@ -251,6 +271,8 @@ def flags(frame: pd.DataFrame, column: str) -> NDArray[np.bool_]:
         MissingEvidenceError: Other values.
     """
     values = frame[column]
+    if values.dtype == np.bool_:
+        return np.asarray(values.to_numpy(copy=True))
     known = values.dropna()
     if not all(isinstance(value, bool | np.bool_) for value in known):
         raise MissingEvidenceError(f"column {column} holds other values than true and false")

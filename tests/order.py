@@ -1,8 +1,8 @@
 """Which files of tests begin first, of several processes that each take a file at a time.
 
 A process that has nothing left waits for the one that took a long file last. So the long ones come
-first. The first of them builds the ladder that the others of its folder copy; the second needs none
-and mostly sleeps, so that nobody waits while it is built.
+first. The first of them builds the ladder that the others of its folder copy; those before the next
+of its folder need none, so that nobody waits while it is built.
 """
 
 from pathlib import Path
@@ -14,15 +14,15 @@ LONG = (
     "wall_clock/test_run.py",
     "execution/test_soak.py",
     "feasibility/test_dense.py",
+    "flows/test_ladder.py",
     "ladder/test_refusals.py",
     "ladder/test_kills.py",
     "ladder/test_who_failed_stays_out.py",
-    "flows/test_ladder.py",
     "ladder/test_repro.py",
     "ladder/test_truth.py",
     "ladder/test_settings.py",
 )
-"""Files of half a minute and more, the longest first."""
+"""Files of half a minute and more; behind those that need no ladder, the longest first."""
 
 
 class Item(Protocol):

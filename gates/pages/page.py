@@ -6,6 +6,7 @@ them back.
 """
 
 import dataclasses
+import functools
 import json
 import re
 from dataclasses import dataclass
@@ -262,15 +263,20 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
     return row
 
 
-def _render(template: str, **values: Any) -> str:
-    environment = Environment(
+@functools.cache
+def _environment() -> Environment:
+    """Templates, each compiled once in a process."""
+    return Environment(
         loader=PackageLoader("gates.pages"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(template)
+
+
+def _render(template: str, **values: Any) -> str:
+    page = _environment().get_template(template)
     return page.render(
         style=page_style(),
         gates=GATES,

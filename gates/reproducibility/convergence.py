@@ -123,6 +123,11 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
     Raises:
         MissingEvidenceError: It was not measured at both, on the same windows.
     """
+    key = ("last quarter", root, method, confidence)
+    return evidence.once(key, lambda: _last_quarter(evidence, root, method, confidence))
+
+
+def _last_quarter(evidence: Evidence, root: str, method: str, confidence: float) -> Fall:
     updates = updates_of(evidence, root, method)
     falls = []
     for table, measured in losses(evidence, root, method).items():
@@ -143,9 +148,15 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
 def losses(evidence: Evidence, root: str, method: str) -> dict[str, pd.DataFrame]:
     """By table of a training seed: total loss and windows of held-out episodes, by updates so far.
 
+    Do not write into the frames.
+
     Raises:
         MissingEvidenceError: It was not measured in every training of the method, or stated twice.
     """
+    return evidence.once(("losses", root, method), lambda: _losses(evidence, root, method))
+
+
+def _losses(evidence: Evidence, root: str, method: str) -> dict[str, pd.DataFrame]:
     tables = evidence.bind(f"{root}/{method}/seed_*/{VALIDATION_FILE}")
     trained = evidence.bind(f"{root}/{method}/seed_*/model.safetensors")
     if not tables or len(tables) != len(trained):

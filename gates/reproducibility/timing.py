@@ -1,5 +1,7 @@
 """Timing: is every term known, does it come back in other processes, and does the model hold?"""
 
+import functools
+
 import numpy as np
 import pandas as pd
 
@@ -28,6 +30,8 @@ ACTIONS = (
 """What may be declared (`genpolicy.contract.latency.DeadlineAction`)."""
 DECLARED = "declared, not measured"
 """Said of latency terms that somebody wrote down."""
+# A root of an integral, asked anew for every method with the same numbers.
+_spread_found = functools.cache(spread_found)
 
 KINDS = {"component": TERMS, "temperature": (COLD, WARM), "source": ("measured", "declared")}
 """What the rows of `latency.parquet` may be of."""
@@ -98,7 +102,7 @@ def _ratio_of_runs(
         f"over {len(first)} processes each; {weighed.said}; {_least_stable(rows, temperature)}"
     )
     if limit is not None and limit > 1.0:
-        spread = spread_found(limit, len(first), confidence=settings.confidence)
+        spread = _spread_found(limit, len(first), confidence=settings.confidence)
         text += (
             f"; equal runs pass in four of five if processes differ by {percent(spread)} at most"
         )

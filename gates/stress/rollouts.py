@@ -150,12 +150,18 @@ class StressSettings(CandidateSettings):
 
 
 def rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:
-    """Rollouts of a method under the planned conditions.
+    """Rollouts of a method under the planned conditions; do not write into the frame.
 
     Raises:
         MissingEvidenceError: A condition is missing, has fewer starts than planned, or a rollout
             counts as another end than the one it came to.
     """
+    # Most measures of the gate ask for them, each for every method.
+    key = (ROLLOUTS, method, settings.perturbations, settings.planned_starts)
+    return evidence.once(key, lambda: _rollouts(evidence, settings, method))
+
+
+def _rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:
     rows = evidence.of(ROLLOUTS, RolloutRow, method)
     rows = rows[rows["perturbation"].isin(settings.perturbations)]
     absent = sorted(set(settings.perturbations) - set(rows["perturbation"]))

@@ -187,6 +187,39 @@ def test_what_is_read_inside_is_told_there_and_stays_told_outside(repo):
     assert outer == [f"artifacts/{name}" for name in ("first", "second", "third")]
 
 
+def test_what_is_made_once_counts_as_read_by_all_who_ask(repo):
+    found, made = Evidence(repo), []
+
+    def make():
+        made.append(len(found.rows(NFE, NfeRow)))
+        return made[-1]
+
+    for key, times in (("a", 1), ("a", 1), ("b", 2)):
+        with found.recorded() as read:
+            assert found.once(key, make) == made[0]
+        assert (read, len(made)) == ([NFE], times)
+    with found.recorded() as outside, found.recorded():
+        found.once("a", make)
+    assert outside == [NFE] and list(found.materials) == [NFE]
+
+
+def test_what_could_not_be_made_is_tried_and_refused_again(repo):
+    found = Evidence(repo)
+    for _ in range(2):
+        with found.recorded() as read, pytest.raises(MissingEvidenceError, match="no rows of x"):
+            found.once("a", lambda: found.of(NFE, NfeRow, "x"))
+        assert read == [NFE]
+
+
+def test_a_table_that_is_whole_for_one_row_is_looked_at_again_for_another(repo):
+    found = Evidence(repo)
+    for _ in range(2):
+        found.rows(NFE, NfeRow)
+        with found.recorded() as read, pytest.raises(IntegrityError, match="unknown column"):
+            found.rows(NFE, ModeOutcome)
+        assert read == [NFE]
+
+
 def test_what_was_not_reached_is_false_and_what_is_no_answer_is_refused():
     frame = pd.DataFrame({"good": [True, None, False], "bad": [True, 1, None]}, dtype=object)
     assert flags(frame, "good").tolist() == [True, False, False]
