@@ -17,6 +17,7 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
 from genpolicy.documents.document import Document
 from genpolicy.errors import BadInputError
+from genpolicy.evidence.documents.failures import FAILURE
 from genpolicy.integrity.documents import canonical_json
 
 
@@ -53,6 +54,15 @@ def root(tmp_path_factory, _ladder):
     (copied / "artifacts/reload/conformance.json").write_bytes(canonical_json({"flow": found}))
     failed = {"asked": 64, "faults": {"late": 1}, "last_words": "no answer within 2 s"}
     (copied / "artifacts/reload/faults.json").write_bytes(canonical_json({"flow": failed}))
+    # Nobody searched on that ladder; a file of each failure is named by what it is about.
+    failure = copied / "artifacts/failure_search" / FAILURE.file
+    failure.parent.mkdir(parents=True)
+    failure.write_bytes(canonical_json({
+        "task": "t", "method": "flow", "checkpoint": "a" * 64, "training_seed": 0, "root_seed": 1,
+        "condition": "nominal", "perturbation": "nominal@search", "severity": 0.5, "number": 3,
+        "point": [0.5], "start": "{}", "start_sha256": "b" * 64, "outcome": "timeout",
+        "events_sha256": "c" * 64,
+    }))  # fmt: skip
     return copied
 
 
@@ -60,11 +70,12 @@ def folders(root, of):
     """Folders of the evidence that hold a file of this name and form."""
     found = []
     for path in sorted((root / "artifacts").glob(f"*/{of.file}")):
+        folder = path.parents[of.file.count("/")]
         try:
-            of.read(path.parent)
+            of.read(folder)
         except BadInputError:
             continue
-        found.append(path.parent.relative_to(root).as_posix())
+        found.append(folder.relative_to(root).as_posix())
     return found
 
 
@@ -112,7 +123,7 @@ def test_another_key_or_type_is_refused_by_name(root, of):
     kept = path.read_bytes()
     tried = 0
     try:
-        for what, at, name, change in changes(of.read(path.parent)):
+        for what, at, name, change in changes(of.read(root / found[0])):
             document = json.loads(kept)
             inner = document
             for part in at:
