@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 STILL_RAD = 1e-6
 """Joints of one pose, from solutions that began elsewhere."""
-SEAM_COMMANDS = 2
+BOUNDARY_COMMANDS = 2
 """Commands before the last one that the rates at a seam rest on."""
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def knows(context: object, before: int) -> bool:
         told = np.asarray(getattr(context, "q_cmd_history", None), dtype=float)
     except (TypeError, ValueError):
         return before <= 0
-    return (len(told) if told.ndim else 0) >= min(before, SEAM_COMMANDS)
+    return (len(told) if told.ndim else 0) >= min(before, BOUNDARY_COMMANDS)
 
 
 def bytes_of(values: object) -> bytes:
