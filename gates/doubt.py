@@ -104,5 +104,6 @@ def _together(own: Sequence[tuple[str, Doubt]], rest: str) -> Doubt:
     gates = tuple(dict.fromkeys(doubt.gate for _, doubt in own))
     if len(names) < 2:
         return replace(first, also=gates[1:])
-    all_names = f"{', '.join(names[:-1])} and {names[-1]}"
+    # What is counted is counted of each: six failures of both are not three of either.
+    all_names = f"{', '.join(names[:-1])} and {names[-1]}, each"
     return replace(first, text=rest.replace(GAP, all_names, 1), candidate="")

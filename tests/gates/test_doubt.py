@@ -18,11 +18,11 @@ NAMES = ("act", "flow", "flow_policy")
 @pytest.mark.parametrize(
     ("said", "once"),
     [
-        (["act: far.", "flow: far."], ["act and flow: far."]),
-        (["flow: far.", "Alone.", "act: far."], ["flow and act: far.", "Alone."]),
+        (["act: far.", "flow: far."], ["act and flow, each: far."]),
+        (["flow: far.", "Alone.", "act: far."], ["flow and act, each: far.", "Alone."]),
         (["act: far.", "flow: farther."], ["act: far.", "flow: farther."]),
         (["How? (act) So.", "How? (flow) So.", "How? (flow_policy) So."],
-         ["How? (act, flow and flow_policy) So."]),
+         ["How? (act, flow and flow_policy, each) So."]),
         (["How? (act) So.", "Why? (flow) So."], ["How? (act) So.", "Why? (flow) So."]),
         (["act: act moved.", "flow: flow moved."], ["act: act moved.", "flow: flow moved."]),
         (["bc: far.", "act: far."], ["bc: far.", "act: far."]),
@@ -40,8 +40,8 @@ def test_the_criterion_of_several_is_that_of_the_question_and_each_kind_stays_it
     )
     other = Doubt("C", "near", "How? (act) So.", ("x",), "act")
     assert said_once([*near, *cold, other], NAMES) == [
-        Doubt("D", "near", "How? (act and flow) So.", ("x",)),
-        Doubt("D", "cold", "How? (act and flow) So.", ("x",)),
+        Doubt("D", "near", "How? (act and flow, each) So.", ("x",)),
+        Doubt("D", "cold", "How? (act and flow, each) So.", ("x",)),
         other,
     ]
 

@@ -194,11 +194,11 @@ def test_on_the_first_page_no_doubt_is_lost_and_none_is_said_twice(reports):
     kept = {(gate, doubt.kind) for doubt in first for gate in (doubt.gate, *doubt.also)}
     assert {(d.gate, d.kind) for d in every if d.kind != "not shown"} <= kept
     texts = [doubt.text for doubt in (*first, *rest)]
-    nameless = [re.sub(r"\b(diffusion|flow)\b( and flow)?", "X", text) for text in texts]
+    nameless = [re.sub(r"\b(diffusion|flow)\b( and flow, each)?", "X", text) for text in texts]
     assert len(set(nameless)) == len(nameless) < len(every)
     cold = [doubt for doubt in first if doubt.kind == "cold start"]
     assert [(doubt.criteria, doubt.candidate) for doubt in cold] == [(("latency_p95_s",), "")]
-    assert "(diffusion and flow)" in cold[0].text
+    assert "(diffusion and flow, each)" in cold[0].text
 
 
 def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):

@@ -135,7 +135,7 @@ def test_what_holds_of_two_candidates_alike_is_said_once_and_the_card_keeps_each
     single = [f"{name}: {html.unescape(alike)}" for name in ("diffusion", "flow")]
     assert all(any(c.startswith(text) for c in report.caveats) for text in single)
     for page in (index_page(ladder), gate_page(ladder, report)):
-        assert page.count(alike) == 1 and f"diffusion and flow: {alike}" in page
+        assert page.count(alike) == 1 and f"diffusion and flow, each: {alike}" in page
     assert markdown(report).count("beyond what was visited") == 1
     caveats = read_draft(ladder).caveats
     assert all(any(c.startswith(text) for c in caveats) for text in single)

@@ -30,9 +30,10 @@ def test_each_side_that_nobody_visited_is_named_in_millimetres_and_stays_on_the_
     report = judge(ladder, "D")
     assert f"artifacts/{FILE}" in report.materials
     assert said in caveats_of({"D": report})
-    (doubt,) = [one for one in of_a_ladder([report])[0] if one.candidate == "flow"
-                and one.kind == "not visited"]  # fmt: skip
-    assert doubt.text == said
+    doubts = [one.text for one in of_a_ladder([report])[0] if one.kind == "not visited"]
+    names, of_both = ", ".join(sorted(report.candidates)), said.removeprefix("flow: ")
+    assert names == "diffusion, flow"
+    assert doubts == [f"diffusion and flow, each: {of_both}"], "it is the same of both, said once"
     assert not any(BEYOND.match(one.text) for one in of_a_ladder([report])[1])
 
 
