@@ -182,7 +182,7 @@ def test_padding_is_the_last_row_again(folders, two_mode_windows, monkeypatch):
     monkeypatch.setattr(policy_module, "generate", spy)
     observations = two_mode_windows(3, seed=9).observations
     policy = load_policy(folders["flow"])
-    policy._calls = CallShapes((16,))
+    policy._calls, policy._compiled = CallShapes((16,)), None
     policy.sample(observations, noise_names=names(3), candidates=1)
     ((condition, noise),) = seen
     assert len(noise) == 16 and not torch.equal(noise[1], noise[2])
