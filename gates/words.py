@@ -3,6 +3,10 @@
 What is longer than a reader compares is shown by its beginning.
 """
 
+import re
+
+HASH = re.compile(r"[0-9a-f]{64}")
+"""A SHA-256 in a text."""
 SHOWN_HASH = 12
 """Characters of a hash that a reader compares; the file that is shown has all of it."""
 

@@ -8,7 +8,6 @@ them back.
 import dataclasses
 import functools
 import json
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,13 +60,12 @@ from gates.pages.table import columns, deciding, groups, not_asked, passed_by, s
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from gates.stress.rollouts import ROLLOUTS
-from gates.words import SHOWN_HASH
+from gates.words import HASH, SHOWN_HASH
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCard
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.style import page_style
 
-HASH = re.compile(r"[0-9a-f]{64}")
 MARKS = {
     "PASS": "✓",
     "FAIL": "✕",

@@ -4,7 +4,6 @@ A cell has nine digits of a number, the first ones of a hash, and no text that a
 """
 
 import csv
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,13 +13,12 @@ from typing import Any
 
 import pyarrow as pa
 
-from gates.words import SHOWN_HASH
+from gates.words import HASH, SHOWN_HASH
 from genpolicy.integrity.hashing import sha256_bytes
 
 SIGNED_CARD = ".dsse.json"
 LARGEST_BYTES = 100_000
 """Of one file: 300 rollouts with all their columns are half of it, and git keeps every version."""
-HASH = re.compile(r"[0-9a-f]{64}")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that a spreadsheet would run."""
 EQUAL_ROWS = "rows"

@@ -2,10 +2,10 @@
 
 import dataclasses
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
+from gates.words import HASH
 from genpolicy.evidence.documents.given import TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
 
@@ -13,7 +13,6 @@ MAY_BE_NONE = ("eta", "tolerance")
 """Of samplers that have none."""
 NEEDS = {"eta": ("ddim",), "tolerance": ("bosh3",)}
 """Samplers that are another one without it."""
-HASH = re.compile(r"[0-9a-f]{64}")
 
 
 def says_nothing(value: object) -> bool:
