@@ -39,6 +39,9 @@ class Planned(NamedTuple):
 
 PLANNED: Mapping[str, Planned] = {
     "seed": Planned("", "A"),
+    "record.episodes": Planned(">=", "A"),
+    "ingest.train": Planned("", "A"),
+    "ingest.validation": Planned("", "A"),
     "policy.seeds": Planned("", "A"),
     "policy.training.updates": Planned("", "A"),
     PLACE: Planned("", "A"),
@@ -92,7 +95,7 @@ CAUSE_STRICT: Mapping[str, str] = {
     **dict.fromkeys(
         (
             "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share",
-            "lag_drift_steps", "gain_factor", "gain_epoch_factor", "magnitude_factor",
+            "lag_drift_rows", "gain_factor", "gain_epoch_factor", "magnitude_factor",
             "frame_angle_rad", "swapped_columns", "faulty_episodes_share",
         ),
         "<=",

@@ -179,7 +179,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
-        replan_lead_steps=execution.replan_lead_steps,
+        replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
     )

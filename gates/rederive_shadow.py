@@ -116,7 +116,7 @@ def _moments(root: Path, params: Mapping[str, Any]) -> tuple[Shadow, list[Observ
         task=task,
         checker=checker,
         cell=Cell(horizons, section(params, "execution", ExecutionSettings)),
-        late_steps=shadow.late_steps,
+        late_rows=shadow.late_rows,
         samples=shadow.samples,
     )
     return tried, observations, shadow.mutant_observations

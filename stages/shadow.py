@@ -42,7 +42,7 @@ def work(params: Params) -> None:
         task=task,
         checker=make_checker(task, feasibility, action_period_s=period_s),
         cell=Cell(params.horizons, params.section("execution", ExecutionSettings)),
-        late_steps=section.late_steps,
+        late_rows=section.late_rows,
         samples=section.samples,
     )
     data = load_dataset(ARTIFACTS / "ingest")

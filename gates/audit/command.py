@@ -49,7 +49,7 @@ def run_audit(options: AuditOptions, opened: Opened) -> int:
     dataset = load_dataset(opened.folder)
     origins = origins_of(dataset)
     settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
-    checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
+    checks = task_checks(dataset, task=options.task, chunk_rows=settings.chunk_rows)
     report = _audited(options, dataset, settings, checks, work)
     say("writing the evidence and the page")
     with output_folder(out) as folder:

@@ -23,7 +23,7 @@ SHARED = (
 )  # fmt: skip
 """Questions whose limit stands among the criteria of Gate A."""
 OWN = (
-    "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share", "lag_drift_steps",
+    "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share", "lag_drift_rows",
     "gain_factor", "gain_epoch_factor", "magnitude_factor", "frame_angle_rad", "swapped_columns",
     "faulty_episodes_share", "supported_episodes", "supported_share", "denial_share",
     "two_mode_episodes", "two_mode_share", "two_mode_chance", "incoherent_share", "noise_ratio",

@@ -74,7 +74,7 @@ CHECKPOINTS = (
     Checkpoint(
         "need", "perception", "valid modes or recovery hypothesis", "multimodality audit",
         "hidden state or data defect explains it",
-        _of("A", "refused_recordings_accounted unasked_checks clock_residual_s lag_spread_steps "
+        _of("A", "refused_recordings_accounted unasked_checks clock_residual_s lag_spread_rows "
             "calibration_residual_m label_disagreement data_defects held_out_situations "
             "multimodal_situations persistence_margin mode_success_lower mode_feasible_share "
             "mean_defeated_share strata_effect told_share cause_accepted phase_collapse_share"),

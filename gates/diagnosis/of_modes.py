@@ -48,7 +48,7 @@ def alignment_and_hidden_state(look: Look) -> None:
     """Are streams shifted against each other, or is a variable hidden?"""
     look.shown("B.outside_modes_upper")
     look.criteria(
-        "A.clock_residual_s", "A.lag_spread_steps", "A.calibration_residual_m", "A.data_defects",
+        "A.clock_residual_s", "A.lag_spread_rows", "A.calibration_residual_m", "A.data_defects",
         "A.strata_effect", "A.told_share", "A.phase_collapse_share",
     )  # fmt: skip
     # A question to the data that an owner waived is in no number of these.

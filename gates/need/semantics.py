@@ -65,10 +65,10 @@ def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
     question="Is the lag from action to state the same in every epoch?",
     look_at="Data semantics: actions and states are shifted against each other in some epochs.",
 )
-def lag_spread_steps(evidence: Evidence, settings: NeedSettings) -> Measured:
+def lag_spread_rows(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest spread over epochs of the lag of one stream, action steps."""
     frame = evidence.rows(f"{AUDIT}/clocks.parquet", Clock)
-    lags = frame.assign(lag_steps=numbers(frame, "lag_steps")).groupby("stream")["lag_steps"]
+    lags = frame.assign(lag_rows=numbers(frame, "lag_rows")).groupby("stream")["lag_rows"]
     return Measured(float((lags.max() - lags.min()).max()), caveat="largest over streams")
 
 

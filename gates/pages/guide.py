@@ -79,7 +79,7 @@ USED: dict[Gate, tuple[str, ...]] = {
 UNITS: tuple[tuple[str, str], ...] = (
     ("_m_s3", "m/s³"),
     ("_m_s", "m/s"),
-    ("_steps", "action steps"),
+    ("lag_spread_rows", "action steps"),
     ("_s", "s"),
     ("_m", "m"),
     ("_n", "N"),

@@ -48,7 +48,7 @@ def questions(
     epochs = len(np.unique(data.episodes.calibration_epoch))
     alone = "" if epochs > 1 else "there is one calibration epoch: nothing to hold it against"
     pairs = "" if data.paired else "no action commands an observed number"
-    clock = data.position_stream in data.delay_s or settings.declared_lag_steps is not None
+    clock = data.position_stream in data.delay_s or settings.declared_lag_rows is not None
     late = (
         "no receive times and no declared lag: a clock that is late everywhere looks like a robot"
     )

@@ -142,7 +142,7 @@ def series(
     Returns:
         Shape (n, K, d).
     """
-    steps = settings.chunk_steps
+    steps = settings.chunk_rows
     if component.name == POSITION:
         return relative_paths(data, rows, steps)
     if component.name == TIMING:
@@ -157,7 +157,7 @@ def series(
 
 
 def _routes(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
-    return relative_paths(data, rows, ROUTE_CHUNKS * settings.chunk_steps)
+    return relative_paths(data, rows, ROUTE_CHUNKS * settings.chunk_rows)
 
 
 def joined(component: Component, values: Array) -> Array:

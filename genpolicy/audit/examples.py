@@ -30,9 +30,9 @@ def alignment(result: AuditResult, settings: AuditSettings) -> list[Alignment]:
     data, table = result.data, result.data.episodes
     if not data.paired:
         return []
-    lags = episode_lags(data, settings.maximum_lag_steps)
+    lags = episode_lags(data, settings.maximum_lag_rows)
     shifted, moved = realigned(data, result.semantics)
-    after = episode_lags(shifted, settings.maximum_lag_steps) if moved else lags
+    after = episode_lags(shifted, settings.maximum_lag_rows) if moved else lags
     order = table.order if np.all(np.isfinite(table.order)) else np.arange(len(table), dtype=float)
     before_s, after_s = (_offset_s(values, data.period_s, settings) for values in (lags, after))
     return [
@@ -40,7 +40,7 @@ def alignment(result: AuditResult, settings: AuditSettings) -> list[Alignment]:
             episode_uuid=str(table.uuid[number]),
             epoch=str(table.calibration_epoch[number]),
             order=float(order[number]),
-            lag_steps=float(lags[number]),
+            lag_rows=float(lags[number]),
             offset_before_s=float(before_s[number]),
             offset_after_s=float(after_s[number]),
         )
@@ -122,7 +122,7 @@ def _chunks(
 ) -> list[ExampleChunk]:
     data = result.data
     members, query = item.neighbourhood.members, item.neighbourhood.query
-    paths = relative_paths(data, members, settings.chunk_steps)
+    paths = relative_paths(data, members, settings.chunk_rows)
     parts = vectors(data, settings, result.component, members)
     coordinate = _coordinate(parts, item.clustering.labels)
     placed = paths + origin(data, np.array([query], dtype=np.int64))[:, None, :]
@@ -162,5 +162,5 @@ def _coordinate(vectors: Array, labels: Integers) -> Array:
 def _offset_s(lags: Array, period_s: float, settings: AuditSettings) -> Array:
     known = lags[np.isfinite(lags)]
     middle = float(np.median(known)) if len(known) else 0.0
-    declared = settings.declared_lag_steps
+    declared = settings.declared_lag_rows
     return np.asarray((lags - (middle if declared is None else declared)) * period_s)

@@ -103,7 +103,7 @@ def shortest_gap(settings: AuditSettings) -> int:
 
     Half a chunk: demonstrators that have just begun to move apart must not seem to have known.
     """
-    return max(settings.observation_horizon, settings.chunk_steps // 2)
+    return max(settings.observation_horizon, settings.chunk_rows // 2)
 
 
 def past_features(

@@ -136,7 +136,7 @@ def _learn(
     rng: np.random.Generator,
 ) -> Alike:
     weights, importance = forest_weights(data, settings, pool, rows, rng)
-    chunks = relative_paths(data, pool, ROUTE_CHUNKS * settings.chunk_steps)
+    chunks = relative_paths(data, pool, ROUTE_CHUNKS * settings.chunk_rows)
     known, asked = (inputs(data, settings, part) for part in (pool, rows))
     flat = chunks.reshape(len(pool), -1)
     expected = expected_chunks(
@@ -161,7 +161,7 @@ def _asked(
     if near is None:
         return None, None
     item = Neighbourhood(row, alike.pool[near], 1.0 / alike.weights[number][near])
-    paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_steps)
+    paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_rows)
     shift = alike.expected.shift(number, near).reshape(len(near), *paths.shape[1:])
     level = paths.copy()
     level[:-1] += shift
@@ -243,7 +243,7 @@ def inputs(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
 
 def targets(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
     """The whole chunk at its quarters, in units of the least distance of modes. Shape (n, d)."""
-    steps = settings.chunk_steps
+    steps = settings.chunk_rows
     at = np.unique(np.linspace(steps / QUARTERS, steps, QUARTERS).astype(int)) - 1
     paths = relative_paths(data, rows, steps)[:, at]
     return np.asarray(paths.reshape(len(rows), -1) / settings.minimum_separation_m)
@@ -288,12 +288,12 @@ def _rows(
     """
     rows = np.arange(len(data.episode))
     clean = ~data.episodes.is_recovery[data.episode] & (data.grouping == phase)
-    clean &= data.last_row - rows >= settings.chunk_steps // 2
+    clean &= data.last_row - rows >= settings.chunk_rows // 2
     leaves = leaving(data)
     clean &= leaves
     training = (data.episodes.split == "train")[data.episode]
     rng = stream(root_seed, "audit", "learned", phase)
-    apart = max(1, settings.chunk_steps // QUARTERS)
+    apart = max(1, settings.chunk_rows // QUARTERS)
     thinned = rank_of(data, leaves) % apart == 0
     pool = _some(rows[clean & training & thinned], POOL // groups, rng)
     return pool, _some(rows[clean & ~training], max(QUERIES // groups, 100), rng)

@@ -61,7 +61,7 @@ def compare(
             checked.
     """
     members = situation.members
-    actions = data.action[chunk_rows(data, members, settings.chunk_steps)].copy()
+    actions = data.action[chunk_rows(data, members, settings.chunk_rows)].copy()
     start = origin(data, members)
     move = start[-1] - start  # the query is the last member
     if data.forms is not None:

@@ -71,7 +71,7 @@ def features(paths: Array, settings: AuditSettings, like: Array | None = None) -
     Returns:
         Shape (n, min(K, S) * P).
     """
-    n, steps = len(paths), min(settings.chunk_steps, paths.shape[1])
+    n, steps = len(paths), min(settings.chunk_rows, paths.shape[1])
     used = paths[:, :steps]
     if settings.representation == "path":
         used = _by_arc_length(paths, steps, like)

@@ -115,7 +115,7 @@ def _queries(
     data: AuditInput, settings: AuditSettings, rows: Integers, phase: str, root_seed: int
 ) -> Integers:
     """Every n-th row of each held-out episode's phase with half a chunk left; capped at random."""
-    rows = rows[data.last_row[rows] - rows >= settings.chunk_steps // 2]
+    rows = rows[data.last_row[rows] - rows >= settings.chunk_rows // 2]
     _, start = np.unique(data.episode[rows], return_index=True)
     rank = np.arange(len(rows)) - np.repeat(start, np.diff(np.append(start, len(rows))))
     rows = rows[rank % settings.query_stride == 0]

@@ -36,13 +36,13 @@ def kept_identity(
         Share and null draws, shape (99,); None where too few episodes go on that long.
     """
     members = situation.members
-    later = members + settings.persistence_lag_steps
-    alive = later + settings.chunk_steps // 2 <= data.last_row[members]
+    later = members + settings.persistence_lag_rows
+    alive = later + settings.chunk_rows // 2 <= data.last_row[members]
     labels = clustering.labels[alive]
     counts = np.bincount(labels, minlength=clustering.count)
     if np.count_nonzero(counts >= MINIMUM_PER_MODE) < 2:
         return None
-    paths = relative_paths(data, later[alive], ROUTE_CHUNKS * settings.chunk_steps)
+    paths = relative_paths(data, later[alive], ROUTE_CHUNKS * settings.chunk_rows)
     return _against_null(features(paths, settings), labels, rng)
 
 

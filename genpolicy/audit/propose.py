@@ -75,8 +75,8 @@ def propose_settings(
     values |= {name: stated[name] for name in FORMS if name in stated}
     placed = _placed(dataset, contract, pairing, values)
     values |= _separations(dataset, contract, pairing, placed)
-    values["chunk_steps"] = _chunk_steps(dataset, placed, values["minimum_separation_m"])
-    values["persistence_lag_steps"] = values["chunk_steps"]
+    values["chunk_rows"] = _chunk_rows(dataset, placed, values["minimum_separation_m"])
+    values["persistence_lag_rows"] = values["chunk_rows"]
     values |= {name: value for name, value in stated.items() if name != "channel_scale"}
     values["channel_scale"] |= stated.get("channel_scale", {})
     horizon = int(values.get("observation_horizon", 2))
@@ -167,7 +167,7 @@ def _placed(
     return action[:, [k for k, name in enumerate(stated) if not pairing or name in pairing]]
 
 
-def _chunk_steps(dataset: Dataset, placed: np.ndarray, separation: float) -> int:
+def _chunk_rows(dataset: Dataset, placed: np.ndarray, separation: float) -> int:
     """As many actions as go into 0.8 s, or as it takes to travel far enough to part ways."""
     period_s = float(dataset.manifest["action_contract"]["period_s"])
     frames = dataset.split("train").frames

@@ -44,7 +44,7 @@ def fifth_of(data: AuditInput, settings: AuditSettings, rows: Integers) -> Integ
     steps[data.first_row[data.first_row]] = 0.0
     travelled = np.cumsum(steps)
     first = data.first_row[rows]
-    last = np.maximum(data.last_row[rows] - settings.chunk_steps // 2, first)
+    last = np.maximum(data.last_row[rows] - settings.chunk_rows // 2, first)
     whole = travelled[last] - travelled[first]
     by_rows = (rows - first) / np.maximum(last - first, 1)
     along = np.where(whole > 0.0, (travelled[rows] - travelled[first]) / _positive(whole), by_rows)
@@ -54,7 +54,7 @@ def fifth_of(data: AuditInput, settings: AuditSettings, rows: Integers) -> Integ
 def departures(data: AuditInput, settings: AuditSettings, rows: Integers) -> Flags:
     """Rows in which an episode leaves its start, after a rest there. Shape (n,)."""
     rank = rank_of(data, leaving(data))
-    return np.asarray(rank[rows] < max(1, settings.chunk_steps // DEPARTURE))
+    return np.asarray(rank[rows] < max(1, settings.chunk_rows // DEPARTURE))
 
 
 def with_departures(fifths: Integers, departs: Flags, spoke: Flags) -> Integers:

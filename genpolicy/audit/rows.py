@@ -25,7 +25,7 @@ class Clock:
         episodes: Episodes measured.
         offset_before_s: Deviation from the declared alignment.
         offset_after_s: What is left after realignment, measured on the other half of the episodes.
-        lag_steps: Action-to-state lag for the stream of the position; for the others the median
+        lag_rows: Action-to-state lag for the stream of the position; for the others the median
             receive delay, in action steps.
         receive_delay_p50_s: Median receive delay.
         receive_delay_p95_s: 95 % quantile of the receive delay.
@@ -38,7 +38,7 @@ class Clock:
     episodes: int
     offset_before_s: float | None
     offset_after_s: float | None
-    lag_steps: float | None
+    lag_rows: float | None
     receive_delay_p50_s: float | None
     receive_delay_p95_s: float | None
     jitter_p95_s: float | None

@@ -16,7 +16,7 @@ class AuditSettings(BaseModel):
 
     Attributes:
         observation_horizon: Observations that condition an invocation.
-        chunk_steps: Actions per chunk, K.
+        chunk_rows: Actions per chunk, K.
         confidence: Of each end of the interval of what a variable tells.
         position_channel: Observed TCP position (or joint angles); its components pair with the
             first of the action. None: nothing in the observation pairs with the action.
@@ -53,16 +53,16 @@ class AuditSettings(BaseModel):
         minimum_mode_size: Smallest number of episodes that makes a mode.
         resolved_auc: One observed component that tells the clusters apart this well (and by more
             than its scale) means that the observation is not the same.
-        persistence_lag_steps: How much later the clusters must still be there.
-        maximum_lag_steps: Search range of the action-to-state lag.
-        declared_lag_steps: Lag that the contract states; None takes the median of the episodes.
+        persistence_lag_rows: How much later the clusters must still be there.
+        maximum_lag_rows: Search range of the action-to-state lag.
+        declared_lag_rows: Lag that the contract states; None takes the median of the episodes.
         clock_floor_s: Offsets of a clock are reported from here on.
-        clock_resolution_steps: No lag is believed finer than this, action steps.
+        clock_resolution_rows: No lag is believed finer than this, action steps.
         significance: An offset is reported only beyond this many of its standard errors: with some
             twenty of them per data set one in 10,000 clean ones is called defective by chance.
         outlier_share: Share of single episodes with one fault (and two of them at least) that
             makes it worth reporting; below it is a mishap without weight.
-        drift_floor_steps: Reported from: growth of the lag from the first to the last row of an
+        drift_floor_rows: Reported from: growth of the lag from the first to the last row of an
             episode, action steps. Plants differ by up to a step between slow and fast motion.
         gain_floor: Reported from: factor between commanded and observed motion. No arm follows
             that badly, and units differ by more.
@@ -104,7 +104,7 @@ class AuditSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     observation_horizon: int = Field(default=2, ge=1)
-    chunk_steps: int = Field(default=16, ge=2)
+    chunk_rows: int = Field(default=16, ge=2)
     confidence: float = Field(default=0.95, gt=0.5, lt=1)
     position_channel: str | None = "tcp_position_m"
     position_components: list[str] | None = None
@@ -136,14 +136,14 @@ class AuditSettings(BaseModel):
     minimum_mode_share: float = Field(default=0.15, gt=0, lt=0.5)
     minimum_mode_size: int = Field(default=3, ge=2)
     resolved_auc: float = Field(default=0.95, gt=0.5, le=1.0)
-    persistence_lag_steps: int = Field(default=16, ge=1)
-    maximum_lag_steps: int = Field(default=12, ge=1)
-    declared_lag_steps: float | None = None
+    persistence_lag_rows: int = Field(default=16, ge=1)
+    maximum_lag_rows: int = Field(default=12, ge=1)
+    declared_lag_rows: float | None = None
     clock_floor_s: float = Field(default=0.01, gt=0)
-    clock_resolution_steps: float = Field(default=0.25, gt=0)
+    clock_resolution_rows: float = Field(default=0.25, gt=0)
     significance: float = Field(default=4.5, gt=0)
     outlier_share: float = Field(default=0.02, gt=0, lt=1)
-    drift_floor_steps: float = Field(default=1.5, gt=0)
+    drift_floor_rows: float = Field(default=1.5, gt=0)
     gain_floor: float = Field(default=3.0, gt=1)
     gain_epoch_floor: float = Field(default=1.15, gt=1)
     frame_floor_rad: float = Field(default=0.14, gt=0)
@@ -169,7 +169,7 @@ class AuditSettings(BaseModel):
         """Where reporting begins, by the question whose limit may not lie below it."""
         return {
             "clock_residual_s": self.clock_floor_s,
-            "lag_drift_steps": self.drift_floor_steps,
+            "lag_drift_rows": self.drift_floor_rows,
             "gain_factor": self.gain_floor,
             "gain_epoch_factor": self.gain_epoch_floor,
             "frame_angle_rad": self.frame_floor_rad,

@@ -43,7 +43,7 @@ class Alignment:
         episode_uuid: The episode.
         epoch: Calibration epoch.
         order: Rank of the recording; by identifier where no order was recorded.
-        lag_steps: Action-to-state lag; None where it cannot be measured, as for what follows.
+        lag_rows: Action-to-state lag; None where it cannot be measured, as for what follows.
         offset_before_s: Its deviation from the median lag.
         offset_after_s: The same on realigned data.
     """
@@ -51,7 +51,7 @@ class Alignment:
     episode_uuid: str
     epoch: str
     order: float
-    lag_steps: float | None
+    lag_rows: float | None
     offset_before_s: float | None
     offset_after_s: float | None
 

@@ -87,7 +87,7 @@ def find_situations(
         support.append(reach)
         offset = len(found)
         for item in items:
-            paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_steps)
+            paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_rows)
             found.append((str(phase), item, cluster_chunks(paths, settings)))
             progress(f"situations of {phase} clustered", len(found) - offset, len(items))
     return found, tuple(support)
@@ -156,7 +156,7 @@ def examine(
                 rough = roughness(series(data, settings, component, item.members))
     check = None if seed is None else admissible
     chunks = compare(data, settings, item, clustering, admissible=check)
-    paths = relative_paths(data, item.members, settings.chunk_steps)
+    paths = relative_paths(data, item.members, settings.chunk_rows)
     ratio, spread = von_neumann(paths)
     return Situation(
         phase, item, clustering, seed is not None, identity, chunks, ratio, spread,

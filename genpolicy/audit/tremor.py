@@ -37,7 +37,7 @@ def tremors(
         return ()
     places = np.linspace(0, len(situations) - 1, min(len(situations), MEASURED)).astype(int)
     rows = [situations[place].neighbourhood.members for place in places]
-    chunks = [data.action[chunk_rows(data, item, settings.chunk_steps)] for item in rows]
+    chunks = [data.action[chunk_rows(data, item, settings.chunk_rows)] for item in rows]
     motion, size = _motion(data), _sizes(data, settings)
     return tuple(
         _tremor(_name(data, column), [part[..., [column]] for part in chunks], float(size[column]))

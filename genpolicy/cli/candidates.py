@@ -76,7 +76,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     contract = data.observation_contract
     _require_horizons_of_the_ladder(entry, path)
     starts = recorded_starts(data, entry.horizons, seed=MOMENTS_SEED)
-    checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
+    checks = task_checks(data, task=None, chunk_rows=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)
     hashes = DatasetHashes(data.manifest_sha256, split_sha256(data.manifest))

@@ -37,7 +37,7 @@ class TaskChecks:
     scene: Path | None = None
 
 
-def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> TaskChecks:
+def task_checks(dataset: Dataset, *, task: str | None, chunk_rows: int) -> TaskChecks:
     """The checks of the task that the dataset was recorded for.
 
     They are used only if the task is registered and the dataset has exactly its observations:
@@ -46,7 +46,7 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     Args:
         dataset: A verified dataset.
         task: Name of the task; that of the dataset if absent.
-        chunk_steps: Longest chunk to check.
+        chunk_rows: Longest chunk to check.
     """
     names = [task] if task is not None else list(dataset.manifest["tasks"])
     known = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
@@ -66,7 +66,7 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     if contract_hash(dataset.manifest) != plugin.observation.hash():
         return TaskChecks()
     period_s = float(dataset.manifest["action_contract"]["period_s"])
-    limits = FeasibilitySettings(maximum_actions=max(16, chunk_steps))
+    limits = FeasibilitySettings(maximum_actions=max(16, chunk_rows))
     checker = make_checker(plugin, limits, action_period_s=period_s)
 
     def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:

@@ -20,8 +20,17 @@ RENAMED = {
     "policy.training.steps": "updates",
     "policy.training.warmup_steps": "warmup_updates",
     "train_factors.steps": "updates",
+    "execution.replan_lead_steps": "replan_lead_rows",
+    "shadow.late_steps": "late_rows",
+    "audit.chunk_steps": "chunk_rows",
+    "audit.persistence_lag_steps": "persistence_lag_rows",
+    "audit.maximum_lag_steps": "maximum_lag_rows",
+    "audit.declared_lag_steps": "declared_lag_rows",
+    "audit.clock_resolution_steps": "clock_resolution_rows",
+    "audit.drift_floor_steps": "drift_floor_rows",
 }
-"""Keys of `params.yaml` that have another name now, by their place; `steps` are a sampler's."""
+"""Keys of `params.yaml` that have another name now, by their place; `steps` are a sampler's, a
+training has `updates`, actions are `rows`."""
 UNKNOWN = "extra_forbidden"
 
 

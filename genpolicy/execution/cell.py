@@ -66,7 +66,7 @@ class ExecutionSettings(Settings):
     and an age may be one number; what is read back is complete, one entry per phase.
 
     Attributes:
-        replan_lead_steps: Executable actions left at which the next invocation begins, so that its
+        replan_lead_rows: Executable actions left at which the next invocation begins, so that its
             chunk is meant to take over with this row; one that begins behind it is late.
         late_chunk: Phases by what becomes of a late chunk.
         deadline_s: An invocation that takes longer has missed its deadline and is given up.
@@ -93,7 +93,7 @@ class ExecutionSettings(Settings):
         silence_stop_s: Silence after which the supervisor stops; None: it holds, however long.
     """
 
-    replan_lead_steps: int = Field(ge=0)
+    replan_lead_rows: int = Field(ge=0)
     late_chunk: dict[LateChunk, tuple[str, ...]]
     deadline_s: float = Field(gt=0)
     term_deadlines: dict[Term, TermDeadline] = Field(default_factory=dict)
@@ -189,7 +189,7 @@ class Cell:
     @cached_property
     def latest_first_row(self) -> dict[str, int]:
         """By phase, the row with which a chunk may begin at the latest."""
-        last, lead = self.horizons.prediction_horizon - 1, self.execution.replan_lead_steps
+        last, lead = self.horizons.prediction_horizon - 1, self.execution.replan_lead_rows
         return {
             phase: last if what == LateChunk.CONTINUE else lead
             for phase, what in self.execution.late_by_phase.items()

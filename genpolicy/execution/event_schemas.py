@@ -30,7 +30,7 @@ _TYPES: Mapping[str, Json] = {
     ),
     **dict.fromkeys(
         ("n", "t", "version", "execution_horizon", "period_ns", "watchdog_ns", "queue_capacity",
-         "replan_lead_steps", "event_time_ns", "draw", "index", "arrival", "condition_ns",
+         "replan_lead_rows", "event_time_ns", "draw", "index", "arrival", "condition_ns",
          "start_ns", "valid_until_ns", "session_epoch", "row", "sequence", "age_ns", "failures",
          "before_ns", "events", "exposed_ns"),
         _WHOLE,

@@ -217,7 +217,7 @@ class Executor:
         if self.mode not in (ExecutorMode.RUN, ExecutorMode.FALLBACK):
             return False
         now_ns = self._journal.clock(now_s)
-        return self._queue.remaining(now_ns) <= self.cell.execution.replan_lead_steps
+        return self._queue.remaining(now_ns) <= self.cell.execution.replan_lead_rows
 
     def begin_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
         """An invocation is in flight until `end_invocation` or a reset; `detail` goes on record."""

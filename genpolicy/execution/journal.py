@@ -31,7 +31,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 9
+JOURNAL_VERSION = 10
 CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
@@ -40,7 +40,7 @@ MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "replan_lead_steps", "late_chunk",
+                "watchdog_ns", "queue_capacity", "replan_lead_rows", "late_chunk",
                 "fallback_hash", "controller_mode", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "scene": ("bodies",),
@@ -246,7 +246,7 @@ def session_payload(
         "maximum_age_ns": cell.maximum_age_ns,
         "watchdog_ns": cell.watchdog_ns,
         "queue_capacity": cell.execution.queue_capacity,
-        "replan_lead_steps": cell.execution.replan_lead_steps,
+        "replan_lead_rows": cell.execution.replan_lead_rows,
         "late_chunk": cell.execution.late_by_phase,
         "fallback_hash": FALLBACK_HASH,
         "controller_mode": cell.controller_mode,

@@ -249,7 +249,7 @@ class _Session:
 
     def _check_begin(self, row: int, m: Message) -> None:
         """A chunk begins by the row at which it was meant to take over, or may begin late."""
-        lead, phase = self.settings["replan_lead_steps"], self.world.phase
+        lead, phase = self.settings["replan_lead_rows"], self.world.phase
         late = m["arrival"] not in self.last_row and row > lead
         declared = self.settings["late_chunk"].get(phase)
         if late and declared != "continue":

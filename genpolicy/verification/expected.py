@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-ALWAYS = {"version": 9, "fallback_hash": "classical-fallback"}
+ALWAYS = {"version": 10, "fallback_hash": "classical-fallback"}
 """What every session declares: the journal that is read here, since in another one the same words
 may mean something else, and who makes the fallback's chunks, since nobody else commands as such."""
 
@@ -19,7 +19,7 @@ class ExpectedSettings:
         watchdog_s: Silence after which there must be a hold.
         queue_capacity: Chunks that may wait.
         controller_mode: The one mode in which an action may be accepted.
-        replan_lead_steps: A chunk that begins behind this row is late.
+        replan_lead_rows: A chunk that begins behind this row is late.
         late_chunk: `continue`, `hold` or `fallback`, by phase; only where a phase says `continue`
             may a late chunk be executed.
         force_limit_n: Force at which the supervisor stops, by phase. A journal does not declare
@@ -32,7 +32,7 @@ class ExpectedSettings:
     watchdog_s: float
     queue_capacity: int
     controller_mode: str
-    replan_lead_steps: int
+    replan_lead_rows: int
     late_chunk: dict[str, str]
     force_limit_n: dict[str, float]
 
@@ -45,6 +45,6 @@ class ExpectedSettings:
             "watchdog_ns": round(self.watchdog_s * 1e9),
             "queue_capacity": self.queue_capacity,
             "controller_mode": self.controller_mode,
-            "replan_lead_steps": self.replan_lead_steps,
+            "replan_lead_rows": self.replan_lead_rows,
             "late_chunk": self.late_chunk,
         }

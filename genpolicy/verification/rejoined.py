@@ -162,7 +162,7 @@ class Rejoined:
         said.sort(key=lambda one: order[one.invocation])
         return Made(
             rule=own["rule"], turn=candidate["index"], draw=own["draw"], said=tuple(said),
-            lead=self._opened["replan_lead_steps"],
+            lead=self._opened["replan_lead_rows"],
         )  # fmt: skip
 
     def _due(

@@ -12,7 +12,7 @@ from genpolicy.audit.predictability import HISTORY, Prediction
 from genpolicy.audit.question_names import ALWAYS, CLOCK, COLUMN, FROZEN, PAST
 from genpolicy.audit.semantics import measure
 
-WHOLE = SETTINGS.model_copy(update={"declared_lag_steps": 1.0})
+WHOLE = SETTINGS.model_copy(update={"declared_lag_rows": 1.0})
 PAST_ROW = Prediction(HISTORY, "approach", 0.0, -0.1, 0.1, 0.5, 0.5, 90)
 
 
@@ -61,7 +61,7 @@ def test_what_was_not_recorded_is_not_asked(data, change, expected):
     ("changes", "expected"),
     [({"calibration_phase": ""}, {"calibration_at_reference"}),
      ({"calibration_phase": "no such phase"}, {"calibration_at_reference"}),
-     ({"declared_lag_steps": None}, {"constant_lag"})],
+     ({"declared_lag_rows": None}, {"constant_lag"})],
 )  # fmt: skip
 def test_what_the_settings_do_not_name_is_not_asked(data, changes, expected):
     assert silent(data, WHOLE.model_copy(update=changes)) == expected

@@ -49,7 +49,7 @@ def with_yaw(data, angles):
     for row, angle in zip(starts(data), angles, strict=True):
         c, s = np.cos(angle), np.sin(angle)
         matrix = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        action[row : row + SETTINGS.chunk_steps, data.action_rotation] = rotation_to_6d(matrix)
+        action[row : row + SETTINGS.chunk_rows, data.action_rotation] = rotation_to_6d(matrix)
     return replace(data, action=action)
 
 
@@ -57,10 +57,10 @@ def with_grip(data, ticks):
     """The first chunk of each of those episodes closes at a tick."""
     action = data.action.copy()
     for row, tick in zip(starts(data), ticks, strict=True):
-        closed = np.arange(SETTINGS.chunk_steps) >= tick
-        action[row : row + SETTINGS.chunk_steps, data.action_gripper] = np.where(
-            closed, 0.01, 0.04
-        )[:, None]
+        closed = np.arange(SETTINGS.chunk_rows) >= tick
+        action[row : row + SETTINGS.chunk_rows, data.action_gripper] = np.where(closed, 0.01, 0.04)[
+            :, None
+        ]
     return replace(data, action=action)
 
 

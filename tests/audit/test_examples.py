@@ -39,7 +39,7 @@ def situation(data, row, separation=0.1):
 
 def test_offsets_are_seen_before_and_gone_after_realignment(late):
     off = late.episodes.calibration_epoch == "epoch_2"
-    semantics = Semantics((), (), 0, 0, 0.0, shift_steps=np.where(off, 3, 0))
+    semantics = Semantics((), (), 0, 0, 0.0, shift_rows=np.where(off, 3, 0))
     rows = alignment(SimpleNamespace(data=late, semantics=semantics), SETTINGS)
     assert [row.episode_uuid for row in rows] == late.episodes.uuid.tolist()
     before = np.array([row.offset_before_s for row in rows])

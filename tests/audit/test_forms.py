@@ -131,6 +131,6 @@ def test_scales_are_those_of_the_path(data):
     written = replace(data, action=forms(data)["velocity"])
     moved = propose_settings(dataset_of(written), source={"pairing": pairing, "forms": rate})
     assert moved.minimum_separation_m == plain.minimum_separation_m == pytest.approx(0.03)
-    assert moved.chunk_steps == plain.chunk_steps
+    assert moved.chunk_rows == plain.chunk_rows
     assert moved.action_forms == {"x": "rate", "y": "rate"}
     assert not plain.action_forms and not plain.action_gains

@@ -124,7 +124,7 @@ def test_to_rest_first_is_no_route_of_its_own(tremor_m):
 def test_two_ways_part_as_far_after_a_rest(rests):
     """To wait makes the common length no shorter: else nobody gets far enough to part."""
     rng = stream(24, "late")
-    steps = SETTINGS.chunk_steps
+    steps = SETTINGS.chunk_rows
     ahead = np.maximum(np.arange(1, 2 * steps + 1)[None] - rests * np.ones((24, 1)), 0.0) / steps
     side = np.where(np.arange(24) % 2, 1.0, -1.0)[:, None]
     # Ways that part little by little: halfway along they are not yet apart.

@@ -27,7 +27,7 @@ def test_settings_are_proposed_from_units_and_pairing(valid):
     assert settings.minimum_neighbours == 7
     assert settings.context_channels == ["goal", "lamp"]  # of one stream with the position
     assert not settings.phase_observed
-    assert 8 <= settings.chunk_steps <= 10  # 3 x 3 cm at 1 cm a step
+    assert 8 <= settings.chunk_rows <= 10  # 3 x 3 cm at 1 cm a step
 
 
 def test_an_unknown_unit_is_scaled_by_the_spread(valid):

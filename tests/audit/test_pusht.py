@@ -41,7 +41,7 @@ def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
     assert learned.two_mode_episodes > 0.2 * learned.analysed_episodes
     assert learned.persistent < 30
     (clock,) = result.semantics.clocks
-    assert 1.0 < clock.lag_steps < 4.0  # the agent trails its target by some tenths of a second
+    assert 1.0 < clock.lag_rows < 4.0  # the agent trails its target by some tenths of a second
     assert abs(clock.offset_after_s) < 0.02
     folder = tmp_path / "evidence"
     folder.mkdir()

@@ -9,7 +9,7 @@ from genpolicy.audit.data import canonical
 from genpolicy.audit.reach import FIFTHS, departures, fifth_of, reaches, with_departures
 from genpolicy.audit.reach_rows import LOCAL
 
-HALF = SETTINGS.chunk_steps // 2
+HALF = SETTINGS.chunk_rows // 2
 
 
 def episode(position):
@@ -61,5 +61,5 @@ def test_a_departure_is_the_begin_of_the_motion():
     first = rows == data.first_row
     assert found[first].all()
     count = np.bincount(data.episode[found])
-    assert (count >= SETTINGS.chunk_steps // 4).all()
+    assert (count >= SETTINGS.chunk_rows // 4).all()
     assert found.mean() < 0.5

@@ -7,7 +7,7 @@ from written import audited_table, forms, write
 
 from genpolicy.audit.data import canonical
 
-SETTINGS = {"chunk_steps": 16, "persistence_lag_steps": 16, "query_stride": 3, "resamples": 20}
+SETTINGS = {"chunk_rows": 16, "persistence_lag_rows": 16, "query_stride": 3, "resamples": 20}
 # A defect of the data needs no situations.
 FEW = {**SETTINGS, "query_stride": 20}
 UNNAMED, LIKE_THE_STATE = ("action_0", "action_1"), ("action_x", "action_y")

@@ -3,8 +3,11 @@
 import pytest
 from pydantic import ValidationError
 
+from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.settings import RENAMED, Settings, parse_settings
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.shadow.settings import ShadowSection
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.policies.settings import TrainingConfig
 from stages._training import FactorsSection
 
@@ -78,7 +81,13 @@ def test_the_same_word_elsewhere_is_an_unknown_key_and_no_old_name():
 
 
 def test_every_name_that_an_old_key_has_now_is_one_of_its_section():
-    fields = {"policy.training": TrainingConfig, "train_factors": FactorsSection}
+    fields = {
+        "policy.training": TrainingConfig,
+        "train_factors": FactorsSection,
+        "execution": ExecutionSettings,
+        "shadow": ShadowSection,
+        "audit": AuditSettings,
+    }
     for place, now in RENAMED.items():
         section, _, old = place.rpartition(".")
         assert now in fields[section].model_fields

@@ -64,7 +64,7 @@ def test_the_phases_must_be_those_of_the_task(kit, task):
 
 @pytest.mark.parametrize("change", [
     {"unknown": 1}, {"watchdog_s": "0.1"}, {"watchdog_s": 0.0}, {"watchdog_s": math.inf},
-    {"queue_capacity": 0}, {"replan_lead_steps": -1}, {"maximum_age_s": {"approach": math.nan}},
+    {"queue_capacity": 0}, {"replan_lead_rows": -1}, {"maximum_age_s": {"approach": math.nan}},
     {"maximum_age_s": {"approach": -0.1}}, {"maximum_divergence_m": math.nan},
     {"force_limit_n": {"approach": -1.0}}, {"force_limit_n": {"approach": math.nan}},
     {"recovery_hold_s": -1.0}, {"human_timeout_s": math.inf}, {"maximum_failures": 0},
@@ -98,7 +98,7 @@ def test_every_phase_says_what_becomes_of_a_late_chunk(kit, task):
     assert settings.late_by_phase == {phase: what for what in LATE for phase in LATE[what]}
     assert ExecutionSettings(**settings.model_dump()) == settings
     cell = Cell(kit.HORIZONS, settings)
-    lead, last = settings.replan_lead_steps, kit.HORIZONS.prediction_horizon - 1
+    lead, last = settings.replan_lead_rows, kit.HORIZONS.prediction_horizon - 1
     assert cell.latest_first_row == dict.fromkeys(LATE["continue"], last) | dict.fromkeys(
         [*LATE["hold"], *LATE["fallback"]], lead
     )

@@ -247,7 +247,7 @@ PARAMS: dict[str, Any] = {
             refused_recordings_accounted=(0, "perception"),
             unasked_checks=(0, "perception"),
             clock_residual_s=(0.01, "perception"),
-            lag_spread_steps=(1, "controller"),
+            lag_spread_rows=(1, "controller"),
             calibration_residual_m=(0.005, "perception"),
             label_disagreement=(0.2, "model"),
             held_out_situations=(20, "model"),
@@ -446,7 +446,7 @@ def ended_as_it_counts(before: pd.DataFrame, frame: pd.DataFrame) -> pd.DataFram
 
 def lags_apart(frame: pd.DataFrame) -> pd.DataFrame:
     """Clocks whose epochs lag by 2 and by 6 steps: one criterion of gate A fails, no other."""
-    return frame.assign(lag_steps=frame["epoch"].map({"e1": 2.0, "e2": 6.0}))
+    return frame.assign(lag_rows=frame["epoch"].map({"e1": 2.0, "e2": 6.0}))
 
 
 def finding(question: str, measured: float) -> pd.DataFrame:
@@ -605,7 +605,7 @@ def _audit(root: Path) -> None:
                 "episodes": 20,
                 "offset_before_s": 0.03,
                 "offset_after_s": 0.002,
-                "lag_steps": 2.0,
+                "lag_rows": 2.0,
                 "receive_delay_p50_s": 0.02,
                 "receive_delay_p95_s": 0.05,
                 "jitter_p95_s": 0.004,
@@ -693,7 +693,7 @@ def _audit(root: Path) -> None:
                 "episode_uuid": f"e{i}",
                 "epoch": "c0",
                 "order": float(i),
-                "lag_steps": 2.0,
+                "lag_rows": 2.0,
                 "offset_before_s": 0.01 * (i % 2),
                 "offset_after_s": 0.0,
             }

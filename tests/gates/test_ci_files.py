@@ -66,10 +66,10 @@ def test_the_check_of_both_is_green_on_a_ladder_that_passes_and_red_on_one_that_
     _run(["judge", "A"])
     code, text = _run(check_of("gitlab"))
     red = {test.get("name") for test in ET.fromstring(text).findall(".//testcase[failure]")}
-    assert code == 3 and red == {"lag_spread_steps", "report"}, "the gates above stand on another"
+    assert code == 3 and red == {"lag_spread_rows", "report"}, "the gates above stand on another"
     assert "chunking_valid_share" not in red
     code, text = _run(check_of("github"))
-    assert code == 3 and "::error file=reports/gate_a.json,title=Gate A%2C lag_spread_steps" in text
+    assert code == 3 and "::error file=reports/gate_a.json,title=Gate A%2C lag_spread_rows" in text
 
 
 def test_a_page_of_another_ladder_is_red_in_the_list_too(ladder, _run):

@@ -112,8 +112,8 @@ WORSE = {
             AUDIT + "replay.parquet", lambda s: cells("replayed", "failure", share=s)
         ),
         "clock_residual_s": _finding("clock_residual_s"),
-        "lag_spread_steps": _table(
-            AUDIT + "clocks.parquet", lambda s: cells("lag_steps", 2 + 4 * s, share=0.25)
+        "lag_spread_rows": _table(
+            AUDIT + "clocks.parquet", lambda s: cells("lag_rows", 2 + 4 * s, share=0.25)
         ),
         "calibration_residual_m": _finding("calibration_residual_m"),
         "label_disagreement": _table(

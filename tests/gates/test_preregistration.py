@@ -124,13 +124,13 @@ def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed(
     ("section", "name", "value"),
     [
         ("gate_b", "mode_minimum_share", 0.01), ("gate_c", "mode_observations", 3),
-        ("shadow", "observations", 3),
+        ("shadow", "observations", 3), ("record", "episodes", 30),
     ],
 )  # fmt: skip
 def test_how_much_is_looked_at_is_planned(section, name, value):
-    shadow = {"shadow": {"observations": 400}}
-    plan = plan_of({**evidence.PARAMS, **shadow})
-    params = copy.deepcopy({**evidence.PARAMS, **shadow})
+    counts = {"shadow": {"observations": 400}, "record": {"episodes": 80}}
+    plan = plan_of({**evidence.PARAMS, **counts})
+    params = copy.deepcopy({**evidence.PARAMS, **counts})
     params[section][name] = value
     assert [(m.place, m.kind) for m in moves(plan, params)] == [(f"{section}.{name}", "loosened")]
 
@@ -140,6 +140,14 @@ def test_the_training_is_planned():
         params["policy"] = {"training": {"updates": 9}}
 
     assert _moved(more) == [("policy.training.updates", "changed")]
+
+
+@pytest.mark.parametrize("name", ["train", "validation"])
+def test_how_many_episodes_judge_is_planned(name):
+    def other(params):
+        params["ingest"] = {name: 0.1}
+
+    assert _moved(other) == [(f"ingest.{name}", "changed")]
 
 
 def test_every_strict_side_of_the_cause_belongs_to_a_question():

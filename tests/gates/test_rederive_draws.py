@@ -179,7 +179,7 @@ def shadows(checkpoints, dataset, tmp_path_factory):
     )  # fmt: skip
     tried = Shadow(
         task=TASK, checker=checker, cell=Cell(HORIZONS, ExecutionSettings(**PARAMS["execution"])),
-        late_steps=1, samples=SAMPLES,
+        late_rows=1, samples=SAMPLES,
     )  # fmt: skip
     seen = held_out_observations(
         data, horizons=HORIZONS, count=12, generator=stream(1, "shadow", "observations")

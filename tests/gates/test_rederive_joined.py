@@ -45,7 +45,7 @@ def root(checkpoint, tmp_path):
 
 def params_of(joining):
     stress = PARAMS["stress"] | {"samples": SAMPLES, "joining": joining.model_dump()}
-    execution = PARAMS["execution"] | {"replan_lead_steps": LEAD}
+    execution = PARAMS["execution"] | {"replan_lead_rows": LEAD}
     return PARAMS | {"stress": stress, "execution": execution}
 
 
@@ -54,7 +54,7 @@ def rolled(checkpoint, tmp_path):
     def roll(joining):
         path = tmp_path / "journals" / "flow__envelope.mcap"
         path.parent.mkdir()
-        return roll_out(path, checkpoint, joining=joining, replan_lead_steps=LEAD, starts=2)
+        return roll_out(path, checkpoint, joining=joining, replan_lead_rows=LEAD, starts=2)
 
     return roll
 

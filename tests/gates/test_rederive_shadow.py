@@ -75,7 +75,7 @@ class Demonstrator:
 
 @pytest.fixture(scope="module")
 def params(kit):
-    shadow = {"observations": 6, "samples": 2, "late_steps": 1, "mutant_observations": 1}
+    shadow = {"observations": 6, "samples": 2, "late_rows": 1, "mutant_observations": 1}
     return {**kit.PARAMS, "shadow": shadow}
 
 
@@ -86,7 +86,7 @@ def written(params, task, checker, data, kit, tmp_path_factory):
     section = ShadowSection(**params["shadow"])
     shadow = Shadow(
         task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION),
-        late_steps=section.late_steps, samples=section.samples,
+        late_rows=section.late_rows, samples=section.samples,
     )  # fmt: skip
     seen = held_out_observations(
         data, horizons=kit.HORIZONS, count=section.observations,
@@ -243,7 +243,7 @@ def test_the_checks_are_left_out_again_on_the_moments_of_the_dataset(
     rederive_shadow(root, params)
     ((shadow, observations),) = seen
     assert len(observations) >= params["shadow"]["mutant_observations"]
-    assert (shadow.samples, shadow.late_steps) == (2, 1)
+    assert (shadow.samples, shadow.late_rows) == (2, 1)
     with pytest.raises(ConfigError, match=r"seed is True, expected a whole number"):
         rederive_shadow(root, {**params, "seed": True})
 

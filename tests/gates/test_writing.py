@@ -142,7 +142,7 @@ def test_a_fail_is_written_like_any_verdict(ladder):
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     assert write_gate(ladder, "A").verdict == "FAIL"
     text = _page(ladder, "A")
-    assert "lag_spread_steps" in text.split("<h2>Criteria</h2>")[0]
+    assert "lag_spread_rows" in text.split("<h2>Criteria</h2>")[0]
     assert "FAIL" in index_page(ladder)
 
 

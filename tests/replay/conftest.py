@@ -56,7 +56,7 @@ def cell(task):
 def ladder(tmp_path_factory, task, checker, kit, data):
     root = tmp_path_factory.mktemp("artifacts")
     shadow = Shadow(
-        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1, samples=4
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_rows=1, samples=4
     )
     few = held_out_observations(
         data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")

@@ -117,10 +117,10 @@ def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None
             lambda t: t["perception"].update(clock_residuall_s=[1, "r"]),
             "gate_a.limits.perception.clock_residuall_s is a limit of no criterion",
         ),
-        (lambda t: t["controller"]["lag_spread_steps"].pop(), "controller.lag_spread_steps is [1]"),
-        (lambda t: t.update(me={"lag_spread_steps": [1, "r"]}), "gate_a.limits.me is no owner"),
-        (lambda t: t["controller"].update(lag_spread_steps=["1", "r"]), "lag_spread_steps.limit"),
-        (lambda t: t["controller"].update(lag_spread_steps=[float("nan"), "r"]), "lag_spread"),
+        (lambda t: t["controller"]["lag_spread_rows"].pop(), "controller.lag_spread_rows is [1]"),
+        (lambda t: t.update(me={"lag_spread_rows": [1, "r"]}), "gate_a.limits.me is no owner"),
+        (lambda t: t["controller"].update(lag_spread_rows=["1", "r"]), "lag_spread_rows.limit"),
+        (lambda t: t["controller"].update(lag_spread_rows=[float("nan"), "r"]), "lag_spread"),
     ],
 )  # fmt: skip
 def test_a_bad_limit_is_a_bad_setting_and_leaves_no_verdict(

@@ -96,7 +96,7 @@ def cell(foreign_task, kit, tmp_path_factory):
 def shadow(cell):
     return Shadow(
         task=cell.task, checker=cell.checker, cell=Cell(cell.horizons, cell.execution),
-        late_steps=1, samples=2,
+        late_rows=1, samples=2,
     )  # fmt: skip
 
 
@@ -234,7 +234,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         watchdog_s=cell.execution.watchdog_s,
         queue_capacity=cell.execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
-        replan_lead_steps=cell.execution.replan_lead_steps,
+        replan_lead_rows=cell.execution.replan_lead_rows,
         late_chunk=cell.execution.late_by_phase,
         force_limit_n=cell.execution.force_limit_n,
     )

@@ -18,7 +18,7 @@ EXPECTED = ExpectedSettings(
     watchdog_s=EXECUTION.watchdog_s,
     queue_capacity=EXECUTION.queue_capacity,
     controller_mode=CONTROLLER_MODE,
-    replan_lead_steps=EXECUTION.replan_lead_steps,
+    replan_lead_rows=EXECUTION.replan_lead_rows,
     late_chunk=EXECUTION.late_by_phase,
     force_limit_n=EXECUTION.force_limit_n,
 )
@@ -188,7 +188,7 @@ def test_a_late_chunk_is_executed_only_where_the_phase_says_so():
         laxer[0][1]["late_chunk"]["insert"] = claimed
         assert rules(check_messages(laxer)) == {"P1.late"}
     laxer[0][1]["late_chunk"]["insert"] = "hold"
-    laxer[0][1]["replan_lead_steps"] = 4
+    laxer[0][1]["replan_lead_rows"] = 4
     assert rules(check_messages(laxer)) == set()
     assert rules(check_messages(laxer, EXPECTED)) == {"P1.late", "settings.limits"}
 

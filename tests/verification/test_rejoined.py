@@ -22,7 +22,7 @@ from genpolicy.verification.rejoined import (
 ROWS = 16
 STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 HALVED, STEEP = {"decay": math.log(2.0), "newest": 0.7}, {"decay": 50.0, "newest": 0.7}
-OPENED = {"execution_horizon": 8, "maximum_age_ns": {"approach": 90}, "replan_lead_steps": 3}
+OPENED = {"execution_horizon": 8, "maximum_age_ns": {"approach": 90}, "replan_lead_rows": 3}
 
 
 def samples(count, seed=0):

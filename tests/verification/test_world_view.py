@@ -9,7 +9,7 @@ MS = 1_000_000
 SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
 EXPECTED = ExpectedSettings(
     execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
-    controller_mode="m", replan_lead_steps=3, late_chunk={},
+    controller_mode="m", replan_lead_rows=3, late_chunk={},
     force_limit_n={"approach": 20.0, "insert": 40.0},
 )  # fmt: skip
 CHUNK = {

@@ -15,7 +15,7 @@ LEAST_ALIGNED = 2
 ALIGNED_EPISODES = 40
 
 
-def aligned(motion: Motion, follows: Following, maximum_steps: int) -> Motion:
+def aligned(motion: Motion, follows: Following, maximum_rows: int) -> Motion:
     """The same with the commands of each column later by what its joint trails the others.
 
     A hand that closes slowly trails an arm by several rows in every episode: that is its build and
@@ -26,7 +26,7 @@ def aligned(motion: Motion, follows: Following, maximum_steps: int) -> Motion:
     if not np.any(np.abs(coarse) >= LEAST_ALIGNED):
         return motion
     # These lags go in steps of some rows: one step is no difference until it is measured.
-    fine = _column_lags(motion, maximum_steps)
+    fine = _column_lags(motion, maximum_rows)
     behind = _middles(fine - _middles(fine.T)[:, None])
     rows = np.where(np.abs(coarse) >= LEAST_ALIGNED, np.round(behind), 0.0).astype(np.int64)
     rows[np.abs(rows) < LEAST_ALIGNED] = 0
@@ -41,7 +41,7 @@ def aligned(motion: Motion, follows: Following, maximum_steps: int) -> Motion:
     return replace(motion, commanded=commanded)
 
 
-def _column_lags(motion: Motion, maximum_steps: int) -> Array:
+def _column_lags(motion: Motion, maximum_rows: int) -> Array:
     """Lag of each column by itself in some episodes, evenly drawn; NaN where it is not known.
 
     Returns:
@@ -56,7 +56,7 @@ def _column_lags(motion: Motion, maximum_steps: int) -> Array:
     )
     return np.stack(
         [
-            segment_lags(asked[:, [column]], seen[:, [column]], starts, maximum_steps).steps
+            segment_lags(asked[:, [column]], seen[:, [column]], starts, maximum_rows).steps
             for column in range(asked.shape[1])
         ],
         axis=1,

@@ -41,19 +41,19 @@ CLUSTER_SHARE = 0.1
 EDGE_STEPS = 0.5
 
 
-def episode_lags(data: AuditInput, maximum_steps: int) -> Array:
+def episode_lags(data: AuditInput, maximum_rows: int) -> Array:
     """Action-to-state lag of each episode, in steps.
 
     Returns:
         Shape (E,); NaN where the episode is too short, does not move or does not follow.
     """
-    return _lags(make_motion(data), maximum_steps).steps
+    return _lags(make_motion(data), maximum_rows).steps
 
 
 def position_clocks(data: AuditInput, lags: Array, settings: AuditSettings) -> list[Clock]:
     """The stream of the position, one clock per epoch."""
     known = lags[np.isfinite(lags)]
-    reference = settings.declared_lag_steps
+    reference = settings.declared_lag_rows
     if reference is None:
         reference = float(np.median(known)) if len(known) else 0.0
     delay = data.delay_s.get(data.position_stream)
@@ -72,7 +72,7 @@ def position_clocks(data: AuditInput, lags: Array, settings: AuditSettings) -> l
                 episodes=len(values),
                 offset_before_s=before,
                 offset_after_s=after,
-                lag_steps=float(np.median(values)) if len(values) else None,
+                lag_rows=float(np.median(values)) if len(values) else None,
                 receive_delay_p50_s=_quantile(delay, inside, 0.5),
                 receive_delay_p95_s=_quantile(delay, inside, 0.95),
                 jitter_p95_s=_quantile(spacing, inside & same, 0.95),
@@ -100,7 +100,7 @@ def delay_clocks(data: AuditInput, stream: str, starts: Integers) -> list[Clock]
                 episodes=int(np.count_nonzero(member)),
                 offset_before_s=before,
                 offset_after_s=after,
-                lag_steps=None if centre is None else centre / data.period_s,
+                lag_rows=None if centre is None else centre / data.period_s,
                 receive_delay_p50_s=centre,
                 receive_delay_p95_s=_quantile(delay, inside, 0.95),
                 jitter_p95_s=_quantile(np.abs(delay - (centre or 0.0)), inside, 0.95),
@@ -196,7 +196,7 @@ def two_clusters(values: Array, least: float) -> tuple[Flags, Array]:
     return chosen, gaps
 
 
-def shift_steps(taken_s: Array, period_s: float) -> Integers:
+def shift_rows(taken_s: Array, period_s: float) -> Integers:
     """Offsets as whole rows. Shape (E,)."""
     return np.asarray(np.round(taken_s / period_s), dtype=np.int64)
 
@@ -204,7 +204,7 @@ def shift_steps(taken_s: Array, period_s: float) -> Integers:
 def leading_findings(lags: Array, data: AuditInput, settings: AuditSettings) -> list[Finding]:
     """A response that comes before its command, everywhere: no arm does that."""
     known = lags[np.isfinite(lags)]
-    if settings.declared_lag_steps is not None or len(known) < LEAST_EPISODES:
+    if settings.declared_lag_rows is not None or len(known) < LEAST_EPISODES:
         return []
     median, limit = (
         float(np.median(known)),
@@ -279,15 +279,15 @@ def _quantile(values: Array | None, rows: Flags, share: float) -> float | None:
 
 def measure_lags(motion: Motion, settings: AuditSettings) -> Lags:
     """Lag of the response behind the command, by episode; further away where some reach on."""
-    maximum_steps = settings.maximum_lag_steps
-    lags = _lags(motion, maximum_steps)
-    edge = np.abs(np.nan_to_num(lags.steps)) >= maximum_steps - EDGE_STEPS
+    maximum_rows = settings.maximum_lag_rows
+    lags = _lags(motion, maximum_rows)
+    edge = np.abs(np.nan_to_num(lags.steps)) >= maximum_rows - EDGE_STEPS
     if some(edge, len(edge), settings.outlier_share):
-        return _lags(motion, 2 * maximum_steps)
+        return _lags(motion, 2 * maximum_rows)
     return lags
 
 
-def _lags(motion: Motion, maximum_steps: int) -> Lags:
+def _lags(motion: Motion, maximum_rows: int) -> Lags:
     return piecewise_lags(
-        motion.commanded, motion.observed, motion.starts, motion.pieces, maximum_steps
+        motion.commanded, motion.observed, motion.starts, motion.pieces, maximum_rows
     )

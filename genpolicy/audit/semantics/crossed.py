@@ -55,7 +55,7 @@ def crossed_findings(
     commanded = motion.commanded.copy()
     hit = np.zeros(len(among), dtype=bool)
     findings: list[Finding] = []
-    minus = flipped(found, motion.directional, settings.maximum_lag_steps) & among[:, None]
+    minus = flipped(found, motion.directional, settings.maximum_lag_rows) & among[:, None]
     total = int(np.count_nonzero(among))
     turned = [k for k in range(minus.shape[1]) if some(minus[:, k], total, settings.outlier_share)]
     if turned:
@@ -64,7 +64,7 @@ def crossed_findings(
             commanded[rows, column] *= -1.0
             hit |= minus[:, column]
         findings.append(_flipped(data, motion, minus, turned, settings))
-    near = _near(found, found.common_lag, settings.maximum_lag_steps)
+    near = _near(found, found.common_lag, settings.maximum_lag_rows)
     exchanged = swapped(found, column_correlations(found, motion.starts), among & near)
     for first, second in np.argwhere(np.triu(exchanged.any(axis=0))):
         both = exchanged[:, first, second]
@@ -77,13 +77,13 @@ def crossed_findings(
     return findings, commanded, hit
 
 
-def flipped(found: Following, directional: Flags, maximum_steps: int) -> Flags:
+def flipped(found: Following, directional: Flags, maximum_rows: int) -> Flags:
     """Columns that answer the negative of their command, by episode. Shape (E, P)."""
     minus, plus = np.nan_to_num(found.negative), _own(found)
     clear = (minus >= FOLLOWS) & (_evidence(found, plus, minus) >= CLEAR)
     gains, usual = _gains(found)
     alike = np.abs(np.nan_to_num(gains - usual, nan=np.inf)) <= np.log(ALIKE)
-    near = _near(found, found.lag, maximum_steps)
+    near = _near(found, found.lag, maximum_rows)
     return np.asarray(clear & alike & near & ~directional)
 
 
@@ -115,12 +115,12 @@ def swapped(found: Following, correlation: Array, among: Flags) -> Flags:
     return np.asarray(pairs & alone[:, :, None] & alone[:, None, :])
 
 
-def _near(found: Following, lag: Integers, maximum_steps: int) -> Flags:
+def _near(found: Following, lag: Integers, maximum_rows: int) -> Flags:
     """Lags about the usual one: what goes to and fro answers its negative half a round later."""
     follows = _own(found) >= FOLLOWS
     known = found.lag[follows if follows.any() else found.follows]
     usual = float(np.median(known)) if len(known) else 0.0
-    return np.asarray(np.abs(lag - usual) <= maximum_steps / 2.0)
+    return np.asarray(np.abs(lag - usual) <= maximum_rows / 2.0)
 
 
 def _own(found: Following) -> Array:

@@ -40,13 +40,13 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
     cut, distance, ends = _halves(motion)
     extent = np.diff(ends, axis=1)[:, 0]
     # A wait shows no lag and would only change the means that the halves are taken about.
-    reach = settings.maximum_lag_steps
+    reach = settings.maximum_lag_rows
     begin = np.clip(ends[:, 0] - reach, motion.starts[:-1], cut)
     end = np.clip(ends[:, 1] + reach, cut, motion.starts[1:])
     edges = np.stack([motion.starts[:-1], begin, cut, end], axis=1).ravel()
     edges = np.append(edges, motion.starts[-1])
     halves = segment_lags(
-        motion.commanded, motion.observed, edges, settings.maximum_lag_steps
+        motion.commanded, motion.observed, edges, settings.maximum_lag_rows
     ).steps.reshape(count, 4)[:, 1:3]
     whole = np.isin(
         motion.starts[1:], motion.pieces[1:][np.isin(motion.pieces[:-1], motion.starts)]
@@ -63,7 +63,7 @@ def drift_findings(drifts: Array, data: AuditInput, settings: AuditSettings) -> 
     """Drift along the episodes of an epoch, from the growth of the lag."""
     findings = []
     _, spread = within_groups(drifts, data.episodes.calibration_epoch, LEAST_EPISODES)
-    floor = max(settings.drift_floor_steps, settings.clock_floor_s / data.period_s)
+    floor = max(settings.drift_floor_rows, settings.clock_floor_s / data.period_s)
     floor = max(floor, EPOCH_SPREADS * float(np.nan_to_num(spread)))
     for name, count, growth, error in group_medians(
         drifts, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
@@ -75,7 +75,7 @@ def drift_findings(drifts: Array, data: AuditInput, settings: AuditSettings) -> 
                     kind="clock_drift",
                     variable=data.position_stream,
                     where=f"epoch {name or '-'}",
-                    question="lag_drift_steps",
+                    question="lag_drift_rows",
                     measured=abs(growth),
                     floor=limit,
                     unit="steps per episode",

@@ -66,13 +66,13 @@ class Following:
         return np.asarray(np.round(result), dtype=np.int64)
 
 
-def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
+def following(motion: Motion, period_s: float, maximum_rows: int) -> Following:
     """How each column follows its command.
 
     Args:
         motion: Commanded and observed motion.
         period_s: Time between rows, s.
-        maximum_steps: Largest shift, both ways, rows.
+        maximum_rows: Largest shift, both ways, rows.
     """
     span = int(np.clip(round(SPAN_S / period_s), LEAST_SPAN, LARGEST_SPAN))
     x, x_slow = _moves(motion.commanded, motion.pieces, span, motion.starts)
@@ -85,7 +85,7 @@ def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
     power_x, power_y = _running(x), _running(y)
     # Means of a span change little over a part of it.
     stride = max(1, span // 3)
-    reach = stride * -(-maximum_steps // stride)
+    reach = stride * -(-maximum_rows // stride)
     for shift in range(-reach, reach + 1, stride):
         value = _correlation(x, y, (power_x, power_y), starts, shift)
         value[np.broadcast_to(rows - abs(shift) < LEAST_ROWS, shape)] = np.nan

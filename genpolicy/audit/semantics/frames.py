@@ -112,7 +112,7 @@ def frame_findings(
     clean &= ~hit
     if width not in CARTESIAN:
         return findings, commanded
-    odd = _follow_badly(motion, clean, settings.maximum_lag_steps)
+    odd = _follow_badly(motion, clean, settings.maximum_lag_rows)
     if some(np.isin(np.arange(len(clean)), odd), len(clean), settings.outlier_share):
         found = _frame(motion, odd, settings)
         if found is not None and found.kind:
@@ -128,9 +128,9 @@ def _answer(commanded: Array, motion: Motion, episodes: Integers, found: Frame) 
     commanded[rows] = motion.commanded[rows][:, found.swapped] @ found.turn.T
 
 
-def _follow_badly(motion: Motion, among: Flags, maximum_steps: int) -> Integers:
+def _follow_badly(motion: Motion, among: Flags, maximum_rows: int) -> Integers:
     """Episodes whose motion is explained far worse by their command than usual."""
-    everything = _displacements(motion, np.flatnonzero(among), maximum_steps, sample=False)
+    everything = _displacements(motion, np.flatnonzero(among), maximum_rows, sample=False)
     if everything is None:
         return np.zeros(0, dtype=np.int64)
     x, y, group = everything.x, everything.y[len(FRACTIONS) // 2], everything.group
@@ -153,7 +153,7 @@ def _follow_badly(motion: Motion, among: Flags, maximum_steps: int) -> Integers:
 
 def _frame(motion: Motion, episodes: Integers, settings: AuditSettings) -> Frame | None:
     """Frame of a group of episodes, if both halves of it say the same."""
-    whole = _displacements(motion, episodes, settings.maximum_lag_steps)
+    whole = _displacements(motion, episodes, settings.maximum_lag_rows)
     if whole is None:
         return None
     read = _read(whole, settings)
@@ -254,7 +254,7 @@ def _angle(turn: Array) -> float:
 
 
 def _displacements(
-    motion: Motion, episodes: Integers, maximum_steps: int, *, sample: bool = True
+    motion: Motion, episodes: Integers, maximum_rows: int, *, sample: bool = True
 ) -> Displacements | None:
     """Commanded and observed displacements at the lag that fits best under any linear map."""
     if len(episodes) == 0:
@@ -262,25 +262,25 @@ def _displacements(
     length = np.diff(motion.starts)[episodes]
     share = max(1, int(np.ceil(length.sum() / LARGEST_SAMPLE))) if sample else 1
     chosen = episodes[::share]
-    maximum_steps = min(maximum_steps, int(np.median(length)) // 4)
-    reach = SPAN_ROWS + maximum_steps
+    maximum_rows = min(maximum_rows, int(np.median(length)) // 4)
+    reach = SPAN_ROWS + maximum_rows
     rows, numbers = [], []
     for number, episode in enumerate(chosen):
         first, last = int(motion.starts[episode]), int(motion.starts[episode + 1])
-        inner = np.arange(first + maximum_steps + 1, last - reach - 1)
+        inner = np.arange(first + maximum_rows + 1, last - reach - 1)
         rows.append(inner)
         numbers.append(np.full(len(inner), number))
     at, group = np.concatenate(rows), np.concatenate(numbers)
     # No displacement reaches over a splice.
     piece = np.repeat(np.arange(len(motion.pieces) - 1), np.diff(motion.pieces))
     if len(at):
-        whole = piece[at - maximum_steps - 1] == piece[at + reach + 1]
+        whole = piece[at - maximum_rows - 1] == piece[at + reach + 1]
         at, group = at[whole], group[whole]
     if len(at) < 10 * motion.commanded.shape[1]:
         return None
     x = motion.commanded[at + SPAN_ROWS] - motion.commanded[at]
     scale = np.maximum(np.std(x, axis=0), 1e-12)
-    shifts = np.arange(-maximum_steps, maximum_steps + 1)
+    shifts = np.arange(-maximum_rows, maximum_rows + 1)
     left = [_unexplained(x / scale, _moved(motion.observed, at + shift)) for shift in shifts]
     best = at + int(shifts[int(np.argmin(left))])
     before, here, after = (_moved(motion.observed, best + step) for step in (-1, 0, 1))

@@ -34,21 +34,21 @@ class Lags:
     error: Array
 
 
-def segment_lags(leading: Array, trailing: Array, starts: Integers, maximum_steps: int) -> Lags:
+def segment_lags(leading: Array, trailing: Array, starts: Integers, maximum_rows: int) -> Lags:
     """By how many rows `trailing` comes later than `leading`.
 
     Args:
         leading: Shape (N, P).
         trailing: The same quantity, later. Shape (N, P).
         starts: First row of each segment and the number of rows. Shape (S + 1,).
-        maximum_steps: Largest lag that is looked for, both ways; less in short segments.
+        maximum_rows: Largest lag that is looked for, both ways; less in short segments.
     """
     count = len(starts) - 1
     steps, error = np.full(count, np.nan), np.full(count, np.nan)
     if leading.shape[1] == 0 or count == 0:
         return Lags(steps, error)
     leading, trailing = episode_centred(leading, starts), episode_centred(trailing, starts)
-    shifts = np.arange(-maximum_steps, maximum_steps + 1)
+    shifts = np.arange(-maximum_rows, maximum_rows + 1)
     gaps = np.concatenate(
         [
             _gap_variances(leading, trailing, starts[first : last + 1], shifts)
@@ -152,10 +152,10 @@ def _around(
 
 
 def episode_lags(
-    leading: Array, trailing: Array, starts: Integers, pieces: Integers, maximum_steps: int
+    leading: Array, trailing: Array, starts: Integers, pieces: Integers, maximum_rows: int
 ) -> Lags:
     """Lag of each episode, from its longest piece without a splice. Shapes (E,)."""
-    found = segment_lags(leading, trailing, pieces, maximum_steps)
+    found = segment_lags(leading, trailing, pieces, maximum_rows)
     if len(pieces) == len(starts):
         return found
     owner = np.searchsorted(starts, pieces[:-1], side="right") - 1

@@ -21,7 +21,7 @@ from genpolicy.audit.semantics.clocks import (
     measure_lags,
     offset_findings,
     position_clocks,
-    shift_steps,
+    shift_rows,
 )
 from genpolicy.audit.semantics.drift import (
     delay_drift_findings,
@@ -54,7 +54,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     if motion.wraps:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
     frozen, untold = frozen_findings(data, motion, settings)
-    follows = following(motion, data.period_s, settings.maximum_lag_steps)
+    follows = following(motion, data.period_s, settings.maximum_lag_rows)
     turned, answered = frame_findings(data, motion, follows, settings)
     # A column that answers another's command is larger or smaller than its own, and no unit.
     asked = replace(motion, commanded=answered)
@@ -64,7 +64,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
         findings += component_findings(data, recorded, follows, settings)
-    motion = aligned(motion, follows, settings.maximum_lag_steps)
+    motion = aligned(motion, follows, settings.maximum_lag_rows)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
     others, stream_shift, found, unclocked = _others(data, motion, shift, settings)
@@ -93,8 +93,8 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         start_drift=calibration.start_drift(data),
         findings=in_order(findings),
         notes=(*notes, *remarks, *(note for note in (wander, shared) if note)),
-        shift_steps=shift,
-        stream_shift_steps=stream_shift,
+        shift_rows=shift,
+        stream_shift_rows=stream_shift,
         unclocked=unclocked,
         untold_freezes=untold,
     )
@@ -107,7 +107,7 @@ def _shared_offset(data: AuditInput, settings: AuditSettings) -> str:
     offset on one side only: what is received before it happened is counted (`negative_delays`).
     """
     streams = {*data.delay_s, *(set(data.streams) - {data.position_stream})}
-    if settings.declared_lag_steps is not None:
+    if settings.declared_lag_rows is not None:
         streams -= {data.position_stream}
     if not streams:
         return ""
@@ -125,14 +125,14 @@ def _position(
     stream, period = data.position_stream, data.period_s
     lags = measure_lags(motion, settings)
     offsets = lags.steps * period
-    declared = settings.declared_lag_steps
+    declared = settings.declared_lag_rows
     findings, taken = offset_findings(
         stream,
         offsets,
         data,
         settings,
         declared_s=None if declared is None else declared * period,
-        finest_s=settings.clock_resolution_steps * period,
+        finest_s=settings.clock_resolution_rows * period,
         episode_limit_s=max(EPISODE_STEPS * period, settings.clock_floor_s),
         errors_s=lags.error * period,
     )
@@ -150,7 +150,7 @@ def _position(
         # and only the delay shows that the ages are wrong.
         findings += _by_delay(data, stream, motion, settings)[0]
     findings += drift_findings(episode_drifts(motion, lags.steps, settings), data, settings)
-    return position_clocks(data, lags.steps, settings), shift_steps(taken, period), findings
+    return position_clocks(data, lags.steps, settings), shift_rows(taken, period), findings
 
 
 def _others(
@@ -180,7 +180,7 @@ def _others(
             if found and not any(item.variable == stream for item in findings):
                 findings += found
                 taken = moved
-        shifts[stream] = shift_steps(taken, data.period_s)
+        shifts[stream] = shift_rows(taken, data.period_s)
     return clocks, shifts, findings, tuple(unclocked)
 
 
@@ -218,7 +218,7 @@ def _by_motion(
         data,
         settings,
         declared_s=None,
-        finest_s=settings.clock_resolution_steps * data.period_s,
+        finest_s=settings.clock_resolution_rows * data.period_s,
         episode_limit_s=max(EPISODE_STEPS * data.period_s, settings.clock_floor_s),
         errors_s=lags.error * data.period_s,
     )

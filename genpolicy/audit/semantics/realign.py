@@ -15,10 +15,10 @@ def realigned(data: AuditInput, semantics: Semantics) -> tuple[AuditInput, bool]
         The data and whether anything moved.
     """
     moved = False
-    shift = semantics.shift_steps
+    shift = semantics.shift_rows
     if shift.size and shift.any():
         data, moved = replace(data, action=data.action[_rows(data, -shift)]), True
-    for name, late in semantics.stream_shift_steps.items():
+    for name, late in semantics.stream_shift_rows.items():
         if name in data.streams and late.any():
             observation = data.observation.copy()
             columns = np.arange(observation.shape[1])[data.streams[name]]

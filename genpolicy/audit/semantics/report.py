@@ -28,9 +28,9 @@ class Semantics:
             episodes, unit of the position.
         findings: Deviations beyond the noise, in the order of diagnosis.
         notes: Sentences on what is worth knowing and no deviation.
-        shift_steps: By how many rows the commands of each episode are to be moved so that all
+        shift_rows: By how many rows the commands of each episode are to be moved so that all
             episodes are aligned. Shape (E,).
-        stream_shift_steps: The same for the columns of each other stream that was measured.
+        stream_shift_rows: The same for the columns of each other stream that was measured.
         untold_freezes: Streams that stand still for long in most episodes.
         unclocked: Streams whose clock could not be looked at, neither by delay nor by motion.
     """
@@ -41,8 +41,8 @@ class Semantics:
     start_drift: float
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
-    shift_steps: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    stream_shift_steps: dict[str, Integers] = field(default_factory=dict)
+    shift_rows: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    stream_shift_rows: dict[str, Integers] = field(default_factory=dict)
     unclocked: tuple[str, ...] = ()
     untold_freezes: tuple[str, ...] = ()
 

@@ -36,24 +36,24 @@ def stream_lags(
     if not moving.any():
         return None
     trailing = trailing[:, moving]
-    mapped = _mapped(leading, trailing, motion, settings.maximum_lag_steps)
+    mapped = _mapped(leading, trailing, motion, settings.maximum_lag_rows)
     if mapped is None:
         return None
     shown, followed = mapped
     return episode_lags(
-        shown, trailing[:, followed], motion.starts, motion.pieces, settings.maximum_lag_steps
+        shown, trailing[:, followed], motion.starts, motion.pieces, settings.maximum_lag_rows
     )
 
 
 def _mapped(
-    leading: Array, trailing: Array, motion: Motion, maximum_steps: int
+    leading: Array, trailing: Array, motion: Motion, maximum_rows: int
 ) -> tuple[Array, Integers] | None:
     """The position as the channels show it, for those that it explains."""
     segment = motion.segment
     rows = np.arange(len(leading))
     rows = rows[:: max(1, len(rows) // LARGEST_SAMPLE)]
     best: tuple[float, Array, Array] | None = None
-    for shift in range(-maximum_steps, maximum_steps + 1):
+    for shift in range(-maximum_rows, maximum_rows + 1):
         at = rows[(rows + shift >= 0) & (rows + shift < len(leading))]
         at = at[segment[at] == segment[at + shift]]
         x, y = leading[at], trailing[at + shift]

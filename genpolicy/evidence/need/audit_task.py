@@ -79,7 +79,7 @@ def settings_of(
     """
     shared: dict[str, tuple[str, object]] = {
         "observation_horizon": ("horizons", horizons.observation_horizon),
-        "chunk_steps": ("horizons", horizons.prediction_horizon),
+        "chunk_rows": ("horizons", horizons.prediction_horizon),
         "confidence": ("confidence", confidence),
     }
     twice = sorted(set(shared) & settings.model_fields_set)
@@ -99,7 +99,7 @@ def settings_of(
         "calibration_phase": channels.calibration_phase,
         "context_channels": list(channels.context),
         "ignored_channels": [c.name for c in task.observation.channels if c.stream == PHASE_STREAM],
-        "persistence_lag_steps": horizons.prediction_horizon,
+        "persistence_lag_rows": horizons.prediction_horizon,
     }
     missing = {k: v for k, v in unless_named.items() if k not in settings.model_fields_set}
     return settings.model_copy(update=of_ladder | missing)

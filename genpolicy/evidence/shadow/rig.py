@@ -33,7 +33,7 @@ HORIZONS = HorizonConfig(
     observation_horizon=1, prediction_horizon=ROWS, execution_horizon=8, action_period_s=PERIOD_S
 )
 EXECUTION = ExecutionSettings(
-    replan_lead_steps=3,
+    replan_lead_rows=3,
     late_chunk={LateChunk.CONTINUE: ("approach",), LateChunk.HOLD: ("insert",)},
     deadline_s=0.15,
     watchdog_s=0.1,

@@ -11,11 +11,11 @@ class ShadowSection(Settings):
     Attributes:
         observations: Held-out observations, in equal numbers from every phase.
         samples: Candidates per observation.
-        late_steps: Actions that are late when a chunk arrives.
+        late_rows: Actions that are late when a chunk arrives.
         mutant_observations: Observations on which each check is left out once.
     """
 
     observations: int = Field(ge=1)
     samples: int = Field(ge=2)
-    late_steps: int = Field(ge=0)
+    late_rows: int = Field(ge=0)
     mutant_observations: int = Field(ge=1)

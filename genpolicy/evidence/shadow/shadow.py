@@ -78,14 +78,14 @@ class Shadow:
         task: The task.
         checker: The six layers.
         cell: Executor, supervisor and stub.
-        late_steps: Actions that are late when a chunk arrives.
+        late_rows: Actions that are late when a chunk arrives.
         samples: Candidates per observation.
     """
 
     task: Task
     checker: FeasibilityChecker
     cell: Cell
-    late_steps: int
+    late_rows: int
     samples: int
 
     def __post_init__(self) -> None:
@@ -226,7 +226,7 @@ def case_of(
     candidate: int = 0,
     of: Identity | None = None,
 ) -> Case:
-    """A chunk of an observation at time 0, arriving `late_steps` later.
+    """A chunk of an observation at time 0, arriving `late_rows` later.
 
     Args:
         shadow: What every shadow test shares.
@@ -264,12 +264,12 @@ def case_of(
         maximum_age_s=shadow.cell.execution.maximum_age_s,
         controller_mode=shadow.cell.controller_mode,
     )
-    now_s = shadow.late_steps * period_s
+    now_s = shadow.late_rows * period_s
     moment = Moment(
         observation, q[0], list(item.commanded), now_s=now_s, phase=item.phase,
         q_before=_joints_before(shadow, item, q[0]), measured_at_s=0.0,
     )  # fmt: skip
-    context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_steps)
+    context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_rows)
     proposal = propose([Candidate(metadata, actions)])
     return Case(proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases)
 

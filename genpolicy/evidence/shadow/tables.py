@@ -134,7 +134,7 @@ def checker_document(
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
         controller_mode=cell.controller_mode,
-        replan_lead_steps=execution.replan_lead_steps,
+        replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
     )

@@ -121,7 +121,7 @@ class Deliveries:
         late, execution = self.late_rows(flying, now_s), self._setup.execution
         phase = flying.metadata.task_phase
         falls_back = execution.late_by_phase.get(phase) == LateChunk.FALLBACK
-        if late > execution.replan_lead_steps and falls_back:
+        if late > execution.replan_lead_rows and falls_back:
             self.late_in, self.late_cause = phase, "late chunk"
         if self._refused_unjudged(flying, now_s):
             return

@@ -48,7 +48,7 @@ class Joined:
         flying.prefix = prefix(
             flying.votes,
             rows=self._setup.horizons.prediction_horizon,
-            frozen=self._setup.execution.replan_lead_steps,
+            frozen=self._setup.execution.replan_lead_rows,
         )
 
     def propose(self, flying: InFlight, drawn: list[Candidate], *, late_rows: int) -> Proposal:

@@ -12,7 +12,7 @@ from genpolicy.audit.semantics.drift import drift_findings, episode_drifts
 from genpolicy.audit.semantics.following import following
 from genpolicy.audit.semantics.motion import make_motion
 
-STEPS = SETTINGS.maximum_lag_steps
+STEPS = SETTINGS.maximum_lag_rows
 
 
 def late(motion, column, rows):

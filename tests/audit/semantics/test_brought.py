@@ -72,7 +72,7 @@ def test_a_lag_of_half_of_the_episodes_is_named(name, rows, share):
     assert (clock.kind, len(semantics.findings)) == ("clock", 1)
     assert clock.measured == pytest.approx(rows * data.period_s, rel=0.2)
     hit = chosen(data, share)
-    shifted = semantics.shift_steps != 0
+    shifted = semantics.shift_rows != 0
     wrong = min(np.count_nonzero(shifted != hit), np.count_nonzero(shifted != ~hit))
     assert wrong <= 0.05 * EPISODES
 

@@ -50,7 +50,7 @@ def test_a_response_before_its_command_is_named_everywhere():
     data = arms(16, epochs=1, lag_s=0.01)
     assert kinds(data) == []
     assert kinds(late(data, -3.0, np.ones(60, dtype=bool))) == ["clock"]
-    declared = SETTINGS.model_copy(update={"declared_lag_steps": 4.0})
+    declared = SETTINGS.model_copy(update={"declared_lag_rows": 4.0})
     assert "clock" in kinds(data, declared)
 
 
@@ -67,4 +67,4 @@ def test_stamps_that_say_too_early_show_in_the_delay_where_no_row_could_move():
     assert (finding.kind, finding.variable) == ("clock", name) and "epoch e" in finding.where
     assert finding.measured == pytest.approx(0.08, abs=0.001)
     # Its rows stand where they were recorded: nothing is to be moved.
-    assert not found.shift_steps.any()
+    assert not found.shift_rows.any()

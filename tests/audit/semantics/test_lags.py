@@ -77,4 +77,4 @@ def test_an_unpaired_action_has_no_lag_and_no_finding():
     leader = replace(data, paired=False, observation_position=nothing)
     found = measure(leader, SETTINGS)
     assert found.findings == () and np.isnan(episode_lags(leader, 12)).all()
-    assert all(clock.lag_steps is None for clock in found.clocks)
+    assert all(clock.lag_rows is None for clock in found.clocks)

@@ -101,6 +101,6 @@ def test_a_clock_that_all_epochs_share_is_said_not_to_be_looked_at():
         assert not any(finding.kind == "clock" for finding in found.findings)
         (said,) = [note for note in found.notes if note.startswith("Not looked at")]
         assert all(name in said for name in streams) and "all episodes and epochs" in said
-    declared = SETTINGS.model_copy(update={"declared_lag_steps": 1.0})
+    declared = SETTINGS.model_copy(update={"declared_lag_rows": 1.0})
     (said,) = [n for n in measure(given, declared).notes if n.startswith("Not looked at")]
     assert "camera" in said and f"{data.position_stream}," not in said

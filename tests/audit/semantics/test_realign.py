@@ -15,6 +15,6 @@ def test_a_minority_of_late_episodes_is_named_and_put_right():
     found = measure(late(data, 2.0, chosen), SETTINGS)
     assert [finding.kind for finding in found.findings] == ["clock"]
     assert f"{chosen.sum()} of" in found.findings[0].action
-    assert found.shift_steps.tolist() == (2 * chosen).tolist()
+    assert found.shift_rows.tolist() == (2 * chosen).tolist()
     shifted, moved = realigned(late(data, 2.0, chosen), found)
     assert moved and kinds(shifted) == []

@@ -18,19 +18,19 @@ HORIZONS = HorizonConfig(
 
 def test_the_chunks_audited_are_those_that_train(task):
     settings = settings_of(AuditSettings(), task, HORIZONS, confidence=0.9)
-    found = settings.observation_horizon, settings.chunk_steps, settings.persistence_lag_steps
+    found = settings.observation_horizon, settings.chunk_rows, settings.persistence_lag_rows
     assert (*found, settings.confidence) == (3, 12, 12, 0.9)
     assert (
         settings_of(
-            AuditSettings(persistence_lag_steps=4), task, HORIZONS, confidence=0.9
-        ).chunk_steps
+            AuditSettings(persistence_lag_rows=4), task, HORIZONS, confidence=0.9
+        ).chunk_rows
         == 12
     )
 
 
 @pytest.mark.parametrize(
     ("name", "value", "home"),
-    [("observation_horizon", 3, "horizons"), ("chunk_steps", 12, "horizons"),
+    [("observation_horizon", 3, "horizons"), ("chunk_rows", 12, "horizons"),
      ("confidence", 0.9, "confidence")],
 )  # fmt: skip
 def test_what_is_said_twice_is_refused_even_if_equal(task, name, value, home):
@@ -39,9 +39,9 @@ def test_what_is_said_twice_is_refused_even_if_equal(task, name, value, home):
 
 
 def test_a_named_setting_stands_before_the_tasks_and_before_a_chunk(task):
-    named = AuditSettings(persistence_lag_steps=4, calibration_phase="elsewhere")
+    named = AuditSettings(persistence_lag_rows=4, calibration_phase="elsewhere")
     settings = settings_of(named, task, HORIZONS, confidence=0.9)
-    assert (settings.persistence_lag_steps, settings.calibration_phase) == (4, "elsewhere")
+    assert (settings.persistence_lag_rows, settings.calibration_phase) == (4, "elsewhere")
     assert settings.position_channel == task.audit_channels.position
 
 

@@ -12,7 +12,7 @@ from genpolicy.seeds import stream
 @pytest.fixture(scope="session")
 def shadow(task, checker, kit):
     return Shadow(
-        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_rows=1,
         samples=3,
     )  # fmt: skip
 

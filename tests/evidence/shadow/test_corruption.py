@@ -24,7 +24,7 @@ OWNERS = {item.check: item for item in CORRUPTIONS if item.check}
 @pytest.fixture(scope="module")
 def shadow(task, checker, kit):
     return Shadow(
-        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_rows=1,
         samples=2,
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ from genpolicy.seeds import stream
 def written(task, checker, data, policy, kit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("shadow")
     shadow = Shadow(
-        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_rows=1,
         samples=2,
     )  # fmt: skip
     seen = held_out_observations(data, horizons=kit.HORIZONS, count=5, generator=stream(1, "s"))

@@ -38,7 +38,7 @@ def alternating(rollout):
 
 
 def settings(kit, **changes):
-    values = kit.PARAMS["execution"] | {"replan_lead_steps": LEAD} | changes
+    values = kit.PARAMS["execution"] | {"replan_lead_rows": LEAD} | changes
     return ExecutionSettings(**values)
 
 

@@ -60,7 +60,7 @@ def play(run, kit, plans, declaring, tmp_path):
 def test_where_it_continues_a_late_chunk_begins_at_a_later_row(play, kit):
     rollout = play("continue", ticks=60)
     assert rollout.tally.action_ticks > 0
-    assert min(begins(rollout)) > kit.EXECUTION.replan_lead_steps
+    assert min(begins(rollout)) > kit.EXECUTION.replan_lead_rows
 
 
 def test_where_it_holds_none_begins_and_silence_leads_to_recovery(play, kit):

@@ -275,5 +275,5 @@ def test_only_the_task_of_the_data_checks_them(recordings, tmp_path, monkeypatch
     run(recordings, out)
     dataset = load_dataset(work_folder(out) / "dataset")
     for name in (None, "no such task", "tabletop_insertion"):
-        checks = task_checks(dataset, task=name, chunk_steps=16)
+        checks = task_checks(dataset, task=name, chunk_rows=16)
         assert checks.admissible is None and checks.replay is None and checks.obstacles == []

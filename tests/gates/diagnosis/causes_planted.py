@@ -146,7 +146,7 @@ CAUSES = (
      table("audit/predictions.parquet", cells("told_lower", 0.6)), "A", "told_share"),
     ("diverse-unsuccessful", "then", table(SHADOW, refused_by_jerk), "C", "admissible_share"),
     ("between-modes", "first", table("audit/clocks.parquet", evidence.lags_apart), "A",
-     "lag_spread_steps: 4"),
+     "lag_spread_rows: 4"),
     ("between-modes", "then", table("measure_baselines/modes.parquet", CHUNKED), "A",
      "chunking_valid_share"),
     ("boundary-jump", "first", table("stress/splices.parquet", jumps("jump_m", 6.0)), "D",

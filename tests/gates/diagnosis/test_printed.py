@@ -35,7 +35,7 @@ def held(name, found):
 
 
 def test_the_walk_of_the_page_is_what_the_command_prints(planted):
-    reports = planted(*cause("lag_spread_steps"))
+    reports = planted(*cause("lag_spread_rows"))
     held("walk", f"{gates_text(reports)}\n\n{walk_text(walk(reports, FLOW))}")
 
 

@@ -61,7 +61,7 @@ def mixed_need(root: Path) -> None:
         told=[0.2, 0.1], told_lower=[0.05, -0.1], told_upper=[0.35, 0.3], n=[120, 90]))  # fmt: skip
     edit(root, "audit/recovery.parquet", lambda f: pd.concat([f, f.assign(successes=[7, 9])]))
     edit(root, "audit/clocks.parquet", lambda f: f.assign(
-        offset_after_s=[0.001, -0.004, 0.002, 0.003], lag_steps=[2.0, 2.5, 4.0, 4.25]))  # fmt: skip
+        offset_after_s=[0.001, -0.004, 0.002, 0.003], lag_rows=[2.0, 2.5, 4.0, 4.25]))  # fmt: skip
     edit(root, "audit/findings.parquet", lambda _: evidence.finding("gain_factor", 1.05))
     edit(root, "audit/asked.parquet", lambda f: f.assign(
         asked=[True, False, True], reason=["", "no lag is constant", ""]))  # fmt: skip

@@ -145,11 +145,11 @@ def test_a_lag_is_held_against_the_other_epochs_of_its_stream_alone(ladder):
     """Streams may lag differently; of one the epochs may not."""
 
     def lags(frame, **of):
-        return frame.assign(lag_steps=[of[s] for s in frame["stream"] + frame["epoch"]])
+        return frame.assign(lag_rows=[of[s] for s in frame["stream"] + frame["epoch"]])
 
     path = "audit/clocks.parquet"
     apart = {"robote1": 2.0, "robote2": 2.0, "camerae1": 6.0, "camerae2": 6.0}
     evidence.edit_table(ladder, path, lambda f: lags(f, **apart))
-    assert asked(ladder, semantics.lag_spread_steps, gate="A").value == 0.0
+    assert asked(ladder, semantics.lag_spread_rows, gate="A").value == 0.0
     evidence.edit_table(ladder, path, lambda f: lags(f, **apart | {"camerae2": 4.0}))
-    assert asked(ladder, semantics.lag_spread_steps, gate="A").value == 2.0
+    assert asked(ladder, semantics.lag_spread_rows, gate="A").value == 2.0

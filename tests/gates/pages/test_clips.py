@@ -28,7 +28,7 @@ def session(method, condition, start):
     journal = Journal(f"{method}/{condition}/{start}", {"method": method})
     blank = dict.fromkeys(
         ("execution_horizon", "period_ns", "maximum_age_ns", "watchdog_ns", "queue_capacity",
-         "replan_lead_steps", "late_chunk", "fallback_hash", "controller_mode", "checks_missing")
+         "replan_lead_rows", "late_chunk", "fallback_hash", "controller_mode", "checks_missing")
     )  # fmt: skip
     journal.add("session", 0, {"version": JOURNAL_VERSION, "labels": {"method": method}, **blank})
     journal.add("scene", 0, {"bodies": {}})

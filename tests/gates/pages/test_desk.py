@@ -191,7 +191,7 @@ def test_each_owner_finds_what_is_open(ladder):
     first = part.duties[0]
     assert (first.gate, first.answer.id, first.measured) == (
         "A",
-        "lag_spread_steps",
+        "lag_spread_rows",
         "4 action steps",
     )
     assert first.remark == first.answer.caveat

@@ -10,7 +10,7 @@ from gates.writing import write_gate
     ("name", "text"),
     [
         ("clock_residual_s", "s"),
-        ("lag_spread_steps", "action steps"),
+        ("lag_spread_rows", "action steps"),
         ("projection_p95_m", "m"),
         ("boundary_jerk_p95_m_s3", "m/s³"),
         ("force_peak_p95_n", "N"),
