@@ -124,11 +124,15 @@ def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed(
     ("section", "name", "value"),
     [
         ("gate_b", "mode_minimum_share", 0.01), ("gate_c", "mode_observations", 3),
-        ("shadow", "observations", 3), ("record", "episodes", 30),
+        ("shadow", "observations", 3), ("record", "episodes", 30), ("policy", "fixtures", 1),
+        ("latency", "warm", 1), ("latency", "cold", 1),
     ],
 )  # fmt: skip
 def test_how_much_is_looked_at_is_planned(section, name, value):
-    counts = {"shadow": {"observations": 400}, "record": {"episodes": 80}}
+    counts = {
+        "shadow": {"observations": 400}, "record": {"episodes": 80}, "policy": {"fixtures": 16},
+        "latency": {"warm": 70, "cold": 5, "declared": {}},
+    }  # fmt: skip
     plan = plan_of({**evidence.PARAMS, **counts})
     params = copy.deepcopy({**evidence.PARAMS, **counts})
     params[section][name] = value
