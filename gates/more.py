@@ -18,6 +18,8 @@ ASTRIDE = f"{INSIDE}: more of the same evidence decides"
 
 MOST = 10.0
 """Times as many, from which on nobody would collect them for this question."""
+HARDLY = f"so near that {MOST:g} times as many"
+"""Said where more of the same may not decide."""
 LEAST = 1.1
 """Times as many that are ever said: an end on the limit itself is moved by a few more."""
 
@@ -57,7 +59,7 @@ def enough(
     """
     times = times_as_many(point, interval, limit)
     if not times <= MOST:
-        return f"so near that {MOST:g} times as many ({counted} now) may not decide"
+        return f"{HARDLY} ({counted} now) may not decide"
     # Rounded up: fewer than this would leave the limit inside.
     shown = max(math.ceil(10.0 * times) / 10.0, LEAST)
     holds = "holds" if margin(point, limit, comparison) >= 0 else "is broken"
@@ -72,3 +74,8 @@ def astride(measured: Measured, limit: float, comparison: Comparison) -> str:
     if point is None or ends is None or not all(map(math.isfinite, (point, *ends))):
         return ASTRIDE
     return f"{INSIDE}: {enough(point, ends, limit, comparison, counted=measured.counted)}"
+
+
+def hardly_decided(caveat: str) -> bool:
+    """Whether the sentence of a criterion says that more of the same may not decide it."""
+    return HARDLY in caveat

@@ -6,6 +6,7 @@ from gates.cause import CauseLimits, CauseName, limits_of
 from gates.criterion import criteria_of
 from gates.engine import GateSpec, Judged
 from gates.evidence import MissingEvidenceError
+from gates.more import hardly_decided
 from gates.need import conditioning, modes, semantics, simpler
 from gates.need.cause import asked, found_cause
 from gates.need.settings import (
@@ -24,6 +25,10 @@ SIMPLER = "Next: run the simpler policy that is named above; nothing in the data
 OPEN = (
     "Next: record more episodes, to know whether the simpler policy that is named above is enough; "
     "nothing in the data has to be mended."
+)
+NEAR = (
+    "Next: try the simpler policy that is named above: it is about as good as the limit allows, "
+    "more recordings will hardly tell on which side, and nothing in the data has to be mended."
 )
 SIMPLER_ASKED = frozenset(
     item.id
@@ -47,10 +52,12 @@ def _cause(judged: Judged) -> str:
     text = f"Cause found by the audit: {cause.text}."
     unmet = {answer.id for answer in judged.answers if answer.verdict != "PASS"}
     if cause.name is CauseName.VALID_MODES and unmet and unmet <= TRAINED_ASKED:
-        broken = {answer.id for answer in judged.answers if answer.verdict == "FAIL"}
-        if not unmet & SIMPLER_ASKED:
+        simple = [a for a in judged.answers if a.id in unmet & SIMPLER_ASKED]
+        if not simple:
             return text
-        return f"{text} {SIMPLER if broken & SIMPLER_ASKED else OPEN}"
+        if any(answer.verdict == "FAIL" for answer in simple):
+            return f"{text} {SIMPLER}"
+        return f"{text} {NEAR if any(hardly_decided(a.caveat) for a in simple) else OPEN}"
     if judged.verdict != "PASS":
         return f"{text} Next: {cause.next_action}"
     return f"{text} One mode alone may still be enough: {ONE_MODE}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from gates.closeness import BY_CHANCE, Closeness, by_room, closeness, first_what_does_not_hold
 from gates.doubt import Doubt, sentence
 from gates.doubts import of_a_ladder
-from gates.more import INSIDE
+from gates.more import INSIDE, hardly_decided
 from gates.pages.numbers import at_its_end, between, beyond, human, judged_at, rests_on
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import decided_by
@@ -261,7 +261,8 @@ def remark(answer: Answer) -> str:
     """What the owner of a criterion has to know of it, in one sentence."""
     why = answer.caveat or "nothing was recorded that answers it"
     if answer.verdict == "INCONCLUSIVE":
-        unsure = "not measured" if answer.interval is None else "not decided, more evidence decides"
+        more = "" if hardly_decided(why) else ", more evidence decides"
+        unsure = "not measured" if answer.interval is None else f"not decided{more}"
         return f"{unsure}: {why}"
     if answer.verdict != "PASS":
         return why

@@ -12,6 +12,7 @@ from team import Team
 
 from gates.closeness import closeness
 from gates.evidence import Evidence
+from gates.more import HARDLY
 from gates.pages import page
 from gates.pages.desk import HEADLINES, desk_of, remark
 from gates.pages.desk_card import papers_of, signing_of
@@ -208,6 +209,10 @@ def test_each_owner_finds_what_is_open(ladder):
         (
             {"verdict": "INCONCLUSIVE", "interval": (0.0, 9.0)},
             "not decided, more evidence decides: c",
+        ),
+        (
+            {"verdict": "INCONCLUSIVE", "interval": (0.0, 9.0), "caveat": f"{HARDLY} now"},
+            f"not decided: {HARDLY} now",
         ),
         ({"verdict": "FAIL", "measured": 5.0}, "c"),
         ({"verdict": "FAIL", "caveat": ""}, "nothing was recorded that answers it"),
