@@ -11,11 +11,10 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
 from gates.pages.figures import Plot, Table, colours, dashes, in_order
 from gates.pages.limits import draw_limit, limit_of
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import losses, updates_of
 from gates.reproducibility.settings import GENERATORS
-from gates.words import percent
+from gates.words import percent, share_between
 from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 from genpolicy.policies.validation_row import VALIDATION_FILE, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums

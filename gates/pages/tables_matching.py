@@ -3,11 +3,11 @@
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.figures import Listing, Table
 from gates.pages.limits import limit_of
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import Fall
 from gates.reproducibility.matching import pairs
 from gates.reproducibility.settings import GENERATORS
+from gates.words import share_between
 
 LIMIT = "baseline_fall_upper"
 HEADS = (

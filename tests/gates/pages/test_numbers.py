@@ -5,16 +5,8 @@ import re
 import pytest
 from test_verdicts import criterion
 
-from gates.pages.numbers import (
-    at_its_end,
-    between,
-    beyond,
-    human,
-    judged_at,
-    limit_said,
-    recounted,
-    rests_on,
-)
+from gates.pages.numbers import at_its_end, beyond, judged_at, limit_said, recounted, rests_on
+from gates.readable import between, human
 from gates.report import Recount
 
 
