@@ -103,7 +103,7 @@ def _in_unit(answer: Answer, value: float, digits: int) -> str:
         return in_milli(value, suffix, digits=digits)
     text = three(value, digits=digits)
     if suffix:
-        return f"{text} {suffix}"
+        return f"{text} {suffix.removesuffix('s') if text == '1' else suffix}"
     if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
         return f"×{text}" if RATIO in answer.id else f"{text} to 1"
     if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:

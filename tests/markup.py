@@ -52,9 +52,7 @@ class Markup(HTMLParser):
         self._names.update(value for name, value in attrs if name == "id" and value)
         self._say_if(len(told) < len(attrs), f"{tag} has an attribute twice")
         self._say_if(tag in BLOCKS and around in PHRASES, f"{tag} stands in {around}")
-        self._say_if(
-            tag == "img" and told.get("alt") is None, "a picture says nothing in its place"
-        )
+        self._say_if(tag == "img" and told.get("alt") is None, "a picture has no text")
         unheard = tag in NAMELESS and "aria-label" in told and "role" not in told
         self._say_if(unheard, f"{tag} has a name and no role")
 

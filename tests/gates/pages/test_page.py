@@ -74,7 +74,7 @@ def test_the_markup_of_the_front_page_is_what_a_checker_takes(pages):
         ("<div>", "stay open"),
         ("<p><ul><li>a</li></ul></p>", "ul stands in p"),
         ("<span><div>a</div></span>", "div stands in span"),
-        ('<img src="a">', "a picture says nothing in its place"),
+        ('<img src="a">', "a picture has no text"),
         ('<b class="a" class="b">c</b>', "b has an attribute twice"),
         ('<div aria-label="a">b</div>', "div has a name and no role"),
         ("<table><tr><td>a</td></tr><tr><td>a</td><td>b</td></tr></table>", "rows of [1, 2] cells"),
