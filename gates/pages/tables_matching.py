@@ -53,7 +53,7 @@ RULES = Listing(
     "Matched by two rules: equal updates, equal convergence",
     "One comparison is run, at equal updates; this is what each rule says of it. Equal convergence "
     f"asks the same of both sides: the loss falls by no more than the limit of {LIMIT} over the "
-    "last quarter, at the worse end over held-out episodes. `near its end` is the update from "
+    "last quarter, at the worse end over held-out episodes. Near its end: the update from "
     "which on the loss was no further above its end than that share, as far as it was measured. "
     "What remains to a baseline is a criterion, since it may be all of a gain. What remains to a "
     "candidate it pays for itself, and of a density something remains however long it is trained; "
