@@ -1,5 +1,6 @@
 """Looks at time: how chunks join, how old the queue is, what an answer takes from end to end."""
 
+import math
 from collections.abc import Collection, Mapping
 
 import pandas as pd
@@ -234,4 +235,7 @@ def _lengths(ends: Interval) -> str:
 
 
 def _durations(ends: Interval) -> str:
+    """From when to when; so few measurements may bound no upper end, which is open then."""
+    if math.isinf(ends[1]):
+        return f"{duration(ends[0])} to open"
     return span(duration(ends[0]), duration(ends[1]))

@@ -97,8 +97,9 @@ PLOTS: tuple[Plot, ...] = (
         "What each part earns, changed alone",
         "Point: change against the reference (chunked BC with the MLP encoder and trunk) on the "
         "same held-out episodes (n); line: interval at the ladder's confidence; number: its own "
-        "value, a mean over these episodes. Left: distance to the demonstrated chunk, normalised, for one action that of the first "
-        "action; a generator is further from any one demonstration by design. Middle and right: "
+        "value, a mean over these episodes. Left: distance to the demonstrated chunk, normalised, "
+        "for one action that of the first action; a generator is further from any one "
+        "demonstration by design. Middle and right: "
         "modes reached, and chunks that reach one and pass all six layers. A point right of zero "
         "in blue or orange is an encoder's or a trunk's merit, not a head's. All variants had the "
         "same short training, one seed.",
