@@ -14,6 +14,8 @@
 #            PYTHON=<path>      another Python 3.11 (3.12 should do, 3.11 is tested)
 #            JOBS=<n>           test processes, default 2
 #            SEED=<n>           seed of `make soak`, default 0
+#            VNU=<path>         vnu.jar (of the npm package vnu-jar): with it and Java `make test` has
+#                               the Nu HTML checker read every page; without, those tests are skipped
 #
 # An end of `make ladder`: 0 the ladder ran to its end, and gate E passes or waits for people;
 # otherwise make prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad
@@ -29,6 +31,7 @@ BIN := $(CURDIR)/$(VENV)/bin
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 JOBS ?= 2
 SEED ?= 0
+export VNU
 PYTHON_LEROBOT ?= $(shell command -v python3.12 || command -v python3.13)
 TORCH_PIN := $(shell grep -E '^torch==' constraints.txt)
 
@@ -52,7 +55,7 @@ WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1
 .PHONY: help env ladder smoke test soak lerobot lint doctor clean
 
 help:
-	@sed -n '1,21p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,23p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \

@@ -13,15 +13,12 @@ What does not hold has no room: its bar is full.
 import math
 from dataclasses import dataclass
 
+from gates.readable import EVIDENCE, RATIO
 from gates.report import Answer
 from gates.words import percent
 
 NEAR = 0.9
 """Share of the room from which on little is left, whatever chance does."""
-RATIO = "_ratio"
-"""In names of criteria that are held against no change, which is 1."""
-EVIDENCE = "_e_value"
-"""How names of evidence end: so much to 1."""
 BY_CHANCE = "what is left is less than half of its interval, so that another draw may break it"
 """Said of what is near by its interval."""
 

@@ -177,7 +177,8 @@ def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
     """Print one report as it lies there, not proved."""
     from gates.overview import painted
     from gates.printed import coloured
-    from gates.report import limit_text, measured_text, read_report
+    from gates.readable import limit_text, measured_text
+    from gates.report import read_report
 
     report, digest = read_report(root, _gate(letter))
     if as_json:

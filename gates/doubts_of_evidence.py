@@ -15,6 +15,7 @@ from gates.stress.contact import UNTOUCHED
 from gates.stress.cost import TOO_OLD
 from gates.stress.gains import WORST
 from gates.stress.visited import BEYOND
+from gates.words import percent
 
 FEW = 20
 """Units below which a number says little: of so many, none of which fails, an exact bound of 95 %
@@ -122,7 +123,7 @@ def simpler_rule(report: GateReport) -> Iterator[Doubt]:
         found = ONE_MODE.search(answer.caveat)
         share = float(found[2]) / 100.0 if found else 0.0
         if found and share >= OFTEN:
-            said = f"{found[1]} acts validly in {100.0 * share:.3g} % of the situations ({SHOWN})"
+            said = f"{found[1]} acts validly in {percent(share)} of the situations ({SHOWN})"
             yield about(
                 report, kind, answer, f"with one mode alone {said}; Gate D asks it in motion"
             )

@@ -4,13 +4,15 @@ Whatever keeps the exit code from 0 is a failure here as well: a list that is al
 job that is red would be believed.
 """
 
+import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from gates.overrides import OVERRIDDEN, OVERRIDES, said
 from gates.proof import Rung
-from gates.report import Answer, Gate, GateReport, limit_text, measured_text
+from gates.readable import limit_text, measured_text
+from gates.report import Answer, Gate, GateReport
 from gates.verdicts import counting
 
 
@@ -26,6 +28,8 @@ class ListedTest:
         file: Where it stands, relative to the repository.
         blocks: Whether it keeps the ladder from passing. What stopped a candidate beside one that
             passes does not, nor what holds by the limit of an exception.
+        numbers: What was measured, the ends of its interval and its limit, each by its name with
+            all digits of the report; without what is not there.
     """
 
     gate: str
@@ -34,6 +38,7 @@ class ListedTest:
     text: str
     file: str
     blocks: bool
+    numbers: tuple[tuple[str, float], ...] = ()
 
 
 def cases(rungs: Sequence[Rung], reports: Mapping[Gate, GateReport]) -> list[ListedTest]:
@@ -52,7 +57,10 @@ def beside(name: str, text: str, file: str) -> ListedTest:
 
 
 def as_junit(found: Sequence[ListedTest]) -> str:
-    """JUnit XML: a suite for each gate, a test for each criterion; skipped what does not block."""
+    """JUnit XML: a suite for each gate, a test for each criterion; skipped what does not block.
+
+    Texts have the digits and units of a person; all digits stand in a test's properties.
+    """
     root = ET.Element("testsuites", name="genpolicy")
     for gate in dict.fromkeys(case.gate for case in found):
         own = [case for case in found if case.gate == gate]
@@ -62,6 +70,10 @@ def as_junit(found: Sequence[ListedTest]) -> str:
         for case in own:
             test = ET.SubElement(suite, "testcase", classname=_suite(gate), name=case.name)
             test.set("file", case.file)
+            if case.numbers:
+                properties = ET.SubElement(test, "properties")
+                for name, value in case.numbers:
+                    ET.SubElement(properties, "property", name=name, value=json.dumps(value))
             if case.blocks:
                 ET.SubElement(test, "failure", type=case.state, message=case.text)
             elif _skipped(case):
@@ -104,7 +116,9 @@ def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
         name = f"{answer.id} ({answer.candidate})" if answer.candidate else answer.id
         broken = answer.verdict != "PASS" and (answer.id, answer.candidate) in stand
         blocks = broken and rung.verdict != "PASS"
-        yield ListedTest(rung.gate, name, answer.verdict, _text(answer), rung.report, blocks)
+        yield ListedTest(
+            rung.gate, name, answer.verdict, _text(answer), rung.report, blocks, _numbers(answer)
+        )
     if rung.verdict != "PASS" and not stand:  # something else lacks, and keeps it from passing
         text = report.diagnosis or report.decision
         yield ListedTest(rung.gate, "report", rung.verdict, text, rung.report, blocks=True)
@@ -113,6 +127,12 @@ def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
 def _text(answer: Answer) -> str:
     held = f"{measured_text(answer)}, required {limit_text(answer)}"
     return f"{answer.question} {held}{f' ({answer.caveat})' if answer.caveat else ''}"
+
+
+def _numbers(answer: Answer) -> tuple[tuple[str, float], ...]:
+    low, high = answer.interval or (None, None)
+    found = {"measured": answer.measured, "low": low, "high": high, "limit": answer.threshold}
+    return tuple((name, value) for name, value in found.items() if value is not None)
 
 
 def _message(text: str) -> str:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gates.overrides import OVERRIDDEN, is_said
-from gates.report import GATES, NAMES, Answer, Gate, GateReport, limit_text, measured_text
+from gates.readable import between, limit_text, measured_text
+from gates.report import GATES, NAMES, Answer, Gate, GateReport
 
 NOT_JUDGED = "NOT JUDGED"
 MOST_NAMED = 6
@@ -157,10 +158,7 @@ def _number(answer: Answer) -> str:
     text = measured_text(answer)
     if answer.interval is None:
         return text
-    low, high = answer.interval
-    if answer.measured is None:
-        return f"{low:.6g} to {high:.6g}"
-    return f"{text} ({low:.6g} to {high:.6g})"
+    return between(answer) if answer.measured is None else f"{text} ({between(answer)})"
 
 
 def _of_limit(old: Answer, new: Answer) -> str:

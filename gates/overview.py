@@ -15,7 +15,8 @@ import typer
 from gates.overrides import apart
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
-from gates.report import limit_text, measured_text, read_report, stage_of
+from gates.readable import limit_text, measured_text
+from gates.report import read_report, stage_of
 from gates.verdicts import stopping
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json

@@ -17,13 +17,12 @@ from gates.feasibility import gate as feasibility
 from gates.need import gate as need
 from gates.overriders import require_in_force
 from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
+from gates.readable import limit_text, measured_text
 from gates.report import (
     GATES,
     NAMES,
     Gate,
     GateReport,
-    limit_text,
-    measured_text,
     read_report,
     report_path,
     stage_of,

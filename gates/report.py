@@ -179,20 +179,6 @@ class GateReport(StrictModel):
     overrides: tuple[Overridden, ...] = ()
 
 
-def measured_text(answer: Answer) -> str:
-    """What was measured, for a sentence."""
-    if answer.verdict == "PENDING_REVIEW":
-        return "pending review"
-    return "not measured" if answer.measured is None else f"{answer.measured:.6g}"
-
-
-def limit_text(answer: Answer) -> str:
-    """The limit, for a sentence."""
-    if answer.threshold is None:
-        return "a limit in params.yaml"
-    return f"{answer.comparison} {answer.threshold:.6g}"
-
-
 def report_path(gate: str) -> str:
     """Path of a gate's JSON report, relative to the repository."""
     return f"reports/gate_{gate.lower()}.json"

@@ -7,15 +7,8 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.report import (
-    Answer,
-    Comparison,
-    GateReport,
-    Overridden,
-    Verdict,
-    limit_text,
-    measured_text,
-)
+from gates.readable import limit_text, measured_text
+from gates.report import Answer, Comparison, GateReport, Overridden, Verdict
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
 SIGNIFICANT_DIGITS = 12

@@ -15,7 +15,8 @@ from gates.bounds import upper_quantile, wide_interval
 from gates.diagnosis.reports import NoAnswer, Reports
 from gates.doubt import sentence
 from gates.evidence import MissingEvidenceError
-from gates.report import Answer, Gate, limit_text, measured_text, report_path
+from gates.readable import between, limit_text, measured_text
+from gates.report import Answer, Gate, report_path
 from genpolicy.errors import GenpolicyError
 
 Interval = tuple[float, float]
@@ -136,8 +137,7 @@ def value_text(answer: Answer) -> str:
     """What was measured, with its interval."""
     if answer.interval is None or answer.measured is None:
         return measured_text(answer)
-    low, high = answer.interval
-    return f"{measured_text(answer)} ({low:.4g} to {high:.4g})"
+    return f"{measured_text(answer)} ({between(answer)})"
 
 
 def share_of(hits: pd.Series, clusters: pd.Series, *, confidence: float) -> tuple[float, Interval]:

@@ -11,6 +11,7 @@ from gates.feasibility.settings import CANDIDATES, HELD_OUT, NO_MODE
 from gates.need.settings import MEASURED
 from gates.reproducibility.settings import COVERAGE, RELOAD
 from gates.stress.rollouts import NOMINAL, ROLLOUTS, rollouts
+from gates.words import length, percent, percents, share_between, span
 from genpolicy.evidence.documents.reproducibility import CANDIDATES as IDENTITIES
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow
@@ -94,7 +95,7 @@ def _success_by_mode(look: Look) -> None:
         found[mode] = ends
         look.number(
             f"success of undisturbed rollouts in mode {mode}",
-            f"{share:.3g} ({ends[0]:.3g} to {ends[1]:.3g})",
+            share_between(share, *ends),
             f"{part['start'].nunique()} starts",
             f"{ROLLOUTS}: success, by mode",
         )
@@ -105,8 +106,8 @@ def _success_by_mode(look: Look) -> None:
     for less in (mode for mode, ends in found.items() if ends[1] < least):
         for more in (mode for mode, ends in found.items() if ends[0] > found[less][1]):
             look.causes.append(
-                f"mode {less} fails where mode {more} succeeds: {_ends(found[less])} against "
-                f"{_ends(found[more])}, required {least:g}."
+                f"mode {less} fails where mode {more} succeeds: {percents(*found[less])} against "
+                f"{percents(*found[more])}, required {percent(least)}."
             )
 
 
@@ -116,7 +117,7 @@ def _without_mode(look: Look, rows: pd.DataFrame, confidence: float) -> None:
     value = f"{len(part)} of {len(rows)}"
     if len(part):
         share, ends = share_of(part["won"], part["start"], confidence=confidence)
-        value += f"; success {share:.3g} ({_ends(ends)})"
+        value += f"; success {share_between(share, *ends)}"
     look.number(
         "undisturbed rollouts that belong to no mode", value, f"{part['start'].nunique()} starts",
         f"{ROLLOUTS}: mode, success",
@@ -152,14 +153,14 @@ def _representation(look: Look) -> None:
     share, ends = share_of(refused, _episodes(rows), confidence=settings.confidence)
     look.number(
         "held-out candidates refused by the representation layer",
-        f"{int(refused.sum())} of {len(rows)}: {share:.3g} ({_ends(ends)})",
+        f"{int(refused.sum())} of {len(rows)}: {share_between(share, *ends)}",
         f"{_episodes(rows).nunique()} episodes", f"{CANDIDATES}: representation, {HELD_OUT}",
     )  # fmt: skip
     most = 1.0 - settings.limits.number("admissible_share", otherwise=0.0)
     if ends[0] > most:
         look.causes.append(
-            f"the representation is wrong for the robot: its layer alone refuses {_ends(ends)}, "
-            f"and all layers together may refuse {most:.3g}."
+            "the representation is wrong for the robot: its layer alone refuses "
+            f"{percents(*ends)}, and all layers together may refuse {percent(most)}."
         )
 
 
@@ -199,7 +200,7 @@ def _between_by_nfe(look: Look) -> None:
     rows = look.rows("B", COVERAGE, CoverageRow)
     rows = rows.assign(between=numbers(rows, "between_share"))
     by_nfe = rows.groupby("nfe", sort=True)["between"].mean()
-    shares = [f"{share:.3g} at {nfe}" for nfe, share in by_nfe.items()]
+    shares = [f"{percent(share)} at {nfe}" for nfe, share in by_nfe.items()]
     look.number(
         "share between two modes, by network evaluations", ", ".join(shares),
         f"{int(numbers(rows, 'situations').max())} situations", f"{COVERAGE}: between_share",
@@ -222,7 +223,7 @@ def _projection_by_mode(look: Look) -> None:
         found[mode] = ends
         look.number(
             f"p95 of the move by projection in mode {mode}",
-            f"{_mm(point)} ({_mm(ends[0])} to {_mm(ends[1])})",
+            f"{length(point)} ({_lengths(ends)})",
             f"{episodes.nunique()} episodes, {len(part)} admitted candidates",
             f"{CANDIDATES}: position_change_m, by mode",
         )
@@ -231,7 +232,7 @@ def _projection_by_mode(look: Look) -> None:
         for less in (mode for mode, ends in found.items() if ends[1] <= most):
             look.causes.append(
                 f"projection moves mode {more} beyond the limit and mode {less} not: "
-                f"{_ends(found[more])} against {_ends(found[less])} m, at most {most:g}."
+                f"{_lengths(found[more])} against {_lengths(found[less])}, at most {length(most)}."
             )
 
 
@@ -246,9 +247,5 @@ def _by_mode(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     return [(str(mode), part) for mode, part in told.groupby("mode", sort=True)]
 
 
-def _ends(ends: Interval) -> str:
-    return f"{ends[0]:.3g} to {ends[1]:.3g}"
-
-
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.3g} mm"
+def _lengths(ends: Interval) -> str:
+    return span(length(ends[0]), length(ends[1]))

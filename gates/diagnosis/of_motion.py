@@ -9,6 +9,7 @@ from gates.feasibility.settings import CANDIDATES, HELD_OUT, SHADOW
 from gates.stress.clocks import DIFFER, UNSEEN, UNTOLD, WALL_CLOCK, compared
 from gates.stress.monitors import ALARMS, THRESHOLDS, watched_of
 from gates.stress.rollouts import ROLLOUTS, STRESS
+from gates.words import percents
 from genpolicy.evidence.documents.shadow import MUTANTS
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorThresholdRow
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowHoldRow, ShadowStubRow
@@ -137,7 +138,7 @@ def _monitors(look: Look) -> None:
         low, high = one.coverage[1:]
         look.number(
             f"failures under probes that {one.monitor} would have said before",
-            f"{low:.2g} to {high:.2g}", f"{one.failures} failures",
+            percents(low, high), f"{one.failures} failures",
             f"{ALARMS}, thresholds.parquet: {one.monitor}",
         )  # fmt: skip
 

@@ -7,6 +7,7 @@ from gates.evidence import flags, numbers
 from gates.reproducibility.modes import situations_of
 from gates.reproducibility.settings import MODES
 from gates.stress.rollouts import ROLLOUTS, rollouts
+from gates.words import percents, share_between
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.evidence.rows.stress import RolloutRow
 
@@ -61,7 +62,7 @@ def _success_by_training(look: Look) -> None:
         share, ends = share_of(part["won"], part["start"], confidence=confidence)
         found[str(seed)] = ends
         look.number(
-            f"success of training seed {seed}", f"{share:.3g} ({ends[0]:.3g} to {ends[1]:.3g})",
+            f"success of training seed {seed}", share_between(share, *ends),
             f"{part['start'].nunique()} starts", f"{ROLLOUTS}: success, seed",
         )  # fmt: skip
     if len(found) == 1:
@@ -70,8 +71,8 @@ def _success_by_training(look: Look) -> None:
     best = max(found, key=lambda name: found[name][0])
     if found[worst][1] < found[best][0]:
         look.causes.append(
-            f"trainings differ: seed {worst} succeeds in {found[worst][0]:.3g} to "
-            f"{found[worst][1]:.3g}, seed {best} in {found[best][0]:.3g} to {found[best][1]:.3g}."
+            f"trainings differ: seed {worst} succeeds in "
+            f"{percents(*found[worst])}, seed {best} in {percents(*found[best])}."
         )
 
 

@@ -1,5 +1,6 @@
 """Looks at time: how chunks join, how old the queue is, what an answer takes from end to end."""
 
+import math
 from collections.abc import Collection, Mapping
 
 import pandas as pd
@@ -7,8 +8,9 @@ import pandas as pd
 from gates.diagnosis.looking import Interval, Look, p95_of
 from gates.evidence import MissingEvidenceError, numbers
 from gates.report import Answer
-from gates.reproducibility.latency_budget import LATENCY, MILLI, Budget, Spans, budget_of
+from gates.reproducibility.latency_budget import LATENCY, Budget, Spans, budget_of
 from gates.stress.rollouts import ROLLOUTS, STRESS
+from gates.words import duration, length, span
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import RolloutRow, SpliceRow, StressCountRow
 
@@ -65,8 +67,8 @@ def ages(look: Look) -> None:
     part = rows[rows["perturbation"] == worst]
     look.number(
         f"age of accepted actions where it is largest, {worst}",
-        f"p95 of a rollout at most {_ms(part['action_age_p95_s'].max())}, oldest "
-        f"{_ms(part['action_age_max_s'].max())}",
+        f"p95 of a rollout at most {duration(part['action_age_p95_s'].max())}, oldest "
+        f"{duration(part['action_age_max_s'].max())}",
         f"{part['start'].nunique()} starts",
         f"{ROLLOUTS}: action_age_p95_s, action_age_max_s",
     )
@@ -89,7 +91,7 @@ def _horizons(look: Look) -> None:
     settings = look.reports.settings("D")
     look.number(
         "actions executed of a chunk, and their period",
-        f"H_e {settings.execution_horizon}, {_ms(settings.action_period_s)}",
+        f"H_e {settings.execution_horizon}, {duration(settings.action_period_s)}",
         "", "params.yaml: horizons",
     )  # fmt: skip
 
@@ -102,8 +104,8 @@ def _jumps(look: Look) -> None:
     admitted = _p95(look, own, "jump_m", f"as admitted, joined by {_rules(own)}", look.candidate)
     if admitted[0] > FURTHER * raw[1]:
         look.causes.append(
-            f"joining or projection makes the jump: as proposed {_range(raw)}, as admitted "
-            f"{_range(admitted)}."
+            f"joining or projection makes the jump: as proposed {_lengths(raw)}, as admitted "
+            f"{_lengths(admitted)}."
         )
     every = look.rows("D", SPLICES, SpliceRow, all_methods=True)
     simple = {
@@ -116,8 +118,9 @@ def _jumps(look: Look) -> None:
     widest = max(simple, key=lambda name: simple[name][1])
     if raw[0] > FURTHER * simple[widest][1]:
         look.causes.append(
-            f"successive plans disagree before anything joins them: as proposed {_range(raw)}, of "
-            f"the simple policies at most {_range(simple[widest])} ({widest})."
+            "successive plans disagree before anything joins them: as proposed "
+            f"{_lengths(raw)}, of the simple policies at most {_lengths(simple[widest])} "
+            f"({widest})."
         )
 
 
@@ -130,7 +133,7 @@ def _p95(look: Look, rows: pd.DataFrame, column: str, what: str, method: str) ->
     )  # fmt: skip
     look.number(
         f"p95 of the jump at a boundary of {method}, {what}",
-        f"{1e3 * point:.3g} mm ({_range(ends)})",
+        f"{length(point)} ({_lengths(ends)})",
         f"{values['start'].nunique()} starts, {len(values)} boundaries",
         f"{SPLICES}: {column}",
     )
@@ -191,7 +194,7 @@ def _on_the_bench(look: Look) -> None:
         if mine[1] > other.end_to_end.p50[2]:
             look.causes.append(
                 f"{look.candidate} samples soonest and {name} is through sooner: median of all "
-                f"terms {_ms(mine[0])} against {_ms(other.end_to_end.p50[0])}."
+                f"terms {duration(mine[0])} against {duration(other.end_to_end.p50[0])}."
             )
 
 
@@ -218,22 +221,21 @@ def _in_motion(look: Look) -> None:
         if ends[look.candidate][0] > other[1]:
             look.causes.append(
                 f"{look.candidate} samples soonest, and in motion {name} answers sooner: p95 "
-                f"{_range_ms(other)} against {_range_ms(ends[look.candidate])}."
+                f"{_durations(other)} against {_durations(ends[look.candidate])}."
             )
 
 
 def _spans(spans: Spans) -> str:
     low, high = spans.p95[1:]
-    return f"p50 {_ms(spans.p50[0])}, p95 {_ms(spans.p95[0])} ({_range_ms((low, high))})"
+    return f"p50 {duration(spans.p50[0])}, p95 {duration(spans.p95[0])} ({_durations((low, high))})"
 
 
-def _range(ends: Interval) -> str:
-    return f"{1e3 * ends[0]:.3g} to {1e3 * ends[1]:.3g} mm"
+def _lengths(ends: Interval) -> str:
+    return span(length(ends[0]), length(ends[1]))
 
 
-def _range_ms(ends: Interval) -> str:
-    return f"{MILLI * ends[0]:.3g} to {MILLI * ends[1]:.3g} ms"
-
-
-def _ms(seconds: float) -> str:
-    return f"{MILLI * seconds:.3g} ms"
+def _durations(ends: Interval) -> str:
+    """From when to when; so few measurements may bound no upper end, which is open then."""
+    if math.isinf(ends[1]):
+        return f"{duration(ends[0])} to open"
+    return span(duration(ends[0]), duration(ends[1]))

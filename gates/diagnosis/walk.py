@@ -9,7 +9,8 @@ from gates.diagnosis.places import PLACES, place_of
 from gates.diagnosis.reports import OF_EVIDENCE, Reports
 from gates.overrides import OVERRIDDEN
 from gates.proof import SPECS
-from gates.report import Answer, Gate, GateReport, limit_text, measured_text
+from gates.readable import human, limit_text, measured_text
+from gates.report import Answer, Gate, GateReport
 from gates.verdicts import overridden_here
 
 State = Literal["in order", "in order so far", "not asked", "not decided", "RED"]
@@ -129,5 +130,5 @@ def _overridden(answer: Answer, report: GateReport) -> str:
     entry = overridden_here(answer, report)
     if entry is None:
         return ""
-    held = f"{entry.comparison} {entry.limit:.6g}"
+    held = f"{entry.comparison} {human(answer, entry.limit)}"
     return f"{OVERRIDDEN} by {entry.by} until {entry.expires}: {entry.instead} by {held}. "

@@ -10,7 +10,8 @@ from gates.closeness import BY_CHANCE, Closeness, by_room, closeness, first_what
 from gates.doubt import Doubt, sentence
 from gates.doubts import of_a_ladder
 from gates.more import INSIDE, hardly_decided
-from gates.pages.numbers import at_its_end, between, beyond, human, judged_at, rests_on
+from gates.pages.numbers import at_its_end, beyond, judged_at, rests_on
+from gates.readable import between, human
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import decided_by
 

@@ -15,7 +15,8 @@ from gates.card.rollback import rollback_of
 from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
-from gates.pages.numbers import at_its_end, human
+from gates.pages.numbers import at_its_end
+from gates.readable import human
 from gates.report import Answer, Gate, GateReport, Point
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from gates.words import SHOWN_HASH

@@ -16,6 +16,7 @@ from gates.pages.figures import in_order
 from gates.report import Gate, GateReport
 from gates.stress.cost import STOPS
 from gates.stress.rollouts import DRILL, ROLLOUTS
+from gates.words import number, percent, three
 from genpolicy.evidence.rows.stress import RolloutRow
 
 HEADS = (
@@ -104,8 +105,8 @@ def share(hits: float, of: float) -> Cell:
     if of == 0:
         return Cell("never tried", "")
     if hits == 0:
-        return Cell("none", f"of {of:,.0f}")
-    return Cell(f"{100 * hits / of:.3g} %", f"{hits:,.0f} of {of:,.0f}")
+        return Cell("none", f"of {number(of)}")
+    return Cell(percent(hits / of), f"{number(hits)} of {number(of)}")
 
 
 def _cells(rows: pd.DataFrame) -> tuple[Cell, ...]:
@@ -133,4 +134,4 @@ def _force(rows: pd.DataFrame) -> Cell:
     if touched == 0:
         return Cell("no contact", f"in {len(force):,} rollouts")
     high = float(np.quantile(force, 0.95, method="higher"))
-    return Cell(f"{high:.3g} N", f"touched in {touched:,} of {len(force):,}")
+    return Cell(f"{three(high)} N", f"touched in {touched:,} of {len(force):,}")

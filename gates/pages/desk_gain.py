@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 from pydantic import ValidationError
 
 from gates.bounds import mean_gain
@@ -15,6 +14,7 @@ from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import ROLLOUTS, StressSettings, rollouts
 from gates.stress.utility import mean_worth
 from gates.stress.weights import RECOVERY, by_cost, listed
+from gates.words import share_of
 from genpolicy.statistics.eprocess import gain_interval
 
 
@@ -54,8 +54,8 @@ def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
             f"{means[0]:.3g} against {means[1]:.3g}"
         )
     return (
-        f"{promoted} succeeds in {_share(evidence, settings, promoted)}, the best simple policy"
-        f"{by}, {best}, in {_share(evidence, settings, best)}{worth}: "
+        f"{promoted} succeeds in {_won(evidence, settings, promoted)}, the best simple policy"
+        f"{by}, {best}, in {_won(evidence, settings, best)}{worth}: "
         f"{_points(mean_gain(differences))} points{of} on "
         f"the same {len(differences)} starts in {len(settings.perturbations)} conditions, between "
         f"{_points(low)} and {_points(high)} (each end wrong with at most "
@@ -63,9 +63,9 @@ def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
     )
 
 
-def _share(evidence: Evidence, settings: StressSettings, method: str) -> str:
+def _won(evidence: Evidence, settings: StressSettings, method: str) -> str:
     won = flags(rollouts(evidence, settings, method), "success")
-    return f"{100 * np.mean(won):.3g} % ({int(won.sum()):,} of {len(won):,})"
+    return share_of(float(won.sum()), len(won))
 
 
 def _points(share: float) -> str:

@@ -243,6 +243,18 @@ def markers(names: Iterable[str]) -> dict[str, str]:
     return {name: shapes[colour] for name, colour in colours(names).items()}
 
 
+def line_looks(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """How the curve of each name is drawn: none has colour, shape and dash of another.
+
+    A shape belongs to its method in every figure; dashes are fewer than methods, and come again.
+    """
+    colour, shape, dash = colours(names), markers(names), dashes(names)
+    return {
+        name: {"color": colour[name], "marker": shape[name], "ls": dash[name], "ms": 4}
+        for name in in_order(names)
+    }
+
+
 def dashes(names: Iterable[str]) -> dict[str, Any]:
     """One line style per name, so that curves which coincide can still be told apart."""
     return {name: DASHES[i % len(DASHES)] for i, name in enumerate(in_order(names))}

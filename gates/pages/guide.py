@@ -1,5 +1,6 @@
 """What a reader is told beside the numbers: the question, how to read the page, the words."""
 
+from gates.readable import UNITS
 from gates.report import Gate
 
 QUESTIONS: dict[Gate, str] = {
@@ -76,19 +77,6 @@ USED: dict[Gate, tuple[str, ...]] = {
     "D": ("candidate", "action age", "fallback", "stub", "e-value", "p95", "interval"),
     "E": (),
 }
-UNITS: tuple[tuple[str, str], ...] = (
-    ("_m_s3", "m/s³"),
-    ("_m_s", "m/s"),
-    ("lag_spread_rows", "action steps"),
-    ("_s", "s"),
-    ("_m", "m"),
-    ("_n", "N"),
-)
-
-
-def unit(criterion: str) -> str:
-    """Unit of a criterion by the suffix of its name; empty for counts, shares and ratios."""
-    return next((text for suffix, text in UNITS if criterion.endswith(suffix)), "")
 
 
 def label(name: str) -> str:

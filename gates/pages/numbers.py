@@ -1,52 +1,14 @@
-"""Numbers of a report as a person reads them: percent, ms, mm, three digits; and where judged.
-
-The unit stands in the criterion's name, and its limit says whether it is a share.
-"""
+"""What a page says of a criterion's numbers: against what, where judged, from which rows."""
 
 import re
 
-from gates.closeness import EVIDENCE, RATIO
-from gates.pages.guide import unit
+from gates.readable import EVIDENCE, between, human
 from gates.report import Answer, Recount
-from gates.words import in_milli, number, percent, three
+from gates.words import number, three
 
-RATES = (
-    "_share",
-    "_lower",
-    "_upper",
-    "_margin",
-    "_disagreement",
-    "_coverage",
-    "_deviation",
-    "_gap",
-    "_reachable",
-    "_effect",
-)
-"""How names of shares end."""
 MOST_VALUES = 6
 """Of one column, in a sentence."""
 SIGNS = {"<=": "≤", ">=": "≥"}
-
-
-def human(answer: Answer, value: float | None) -> str:
-    """A number in the unit that a person uses: ms, mm, percent; three digits.
-
-    Args:
-        answer: The criterion, whose name says the unit and whose limit says whether it is a share.
-        value: The number; None is "not measured".
-    """
-    if value is None:
-        return "not measured"
-    suffix = unit(answer.id)
-    if suffix in ("s", "m"):
-        return in_milli(value, suffix)
-    if suffix:
-        return f"{three(value)} {suffix}"
-    if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
-        return f"×{three(value)}" if RATIO in answer.id else f"{three(value)} to 1"
-    if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
-        return percent(value)
-    return number(value)
 
 
 def limit_said(answer: Answer) -> str:
@@ -109,15 +71,6 @@ def _short(said: str) -> str:
     return f"{first} or {len(others)} others that criteria.csv lists"
 
 
-def between(answer: Answer) -> str:
-    """An interval, its unit said once: `35.6 to 50.8 %`; empty where there is none."""
-    if answer.interval is None:
-        return ""
-    low, high = (human(answer, end) for end in answer.interval)
-    alone, _, suffix = low.partition(" ")
-    return f"{alone if suffix and high.endswith(f' {suffix}') else low} to {high}"
-
-
 def beyond(answer: Answer) -> str:
     """How what does not hold stands to its limit; empty of what holds or has no number.
 
@@ -133,11 +86,6 @@ def beyond(answer: Answer) -> str:
     text = human(answer, abs(found - limit)).removeprefix("×")
     text = f"{text.removesuffix(' %')} points" if text.endswith(" %") else text
     return f"{'over' if answer.comparison == '<=' else 'short'} by {text}"
-
-
-def share_between(share: float, low: float, high: float) -> str:
-    """A share and its interval: `48.1 % (28.7 to 68.1)`."""
-    return f"{percent(share)} ({three(100 * low)} to {three(100 * high)})"
 
 
 def rests_on(counted: str) -> str:

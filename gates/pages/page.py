@@ -54,9 +54,10 @@ from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
-from gates.pages.numbers import human, judged_at, limit_said, recounted, rests_on
+from gates.pages.numbers import judged_at, limit_said, recounted, rests_on
 from gates.pages.rows import CRITERIA, Rows, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
+from gates.readable import human
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from gates.stress.rollouts import ROLLOUTS

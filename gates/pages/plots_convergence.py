@@ -1,7 +1,8 @@
 """Figure of Gate B about training: was it done, for candidates and what they are held against?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,13 +10,12 @@ from matplotlib.figure import Figure
 
 from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
-from gates.pages.figures import Plot, Table, colours, dashes, in_order
+from gates.pages.figures import Plot, Table, in_order, line_looks
 from gates.pages.limits import draw_limit, limit_of
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import losses, updates_of
 from gates.reproducibility.settings import GENERATORS
-from gates.words import percent
+from gates.words import percent, share_between
 from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 from genpolicy.policies.validation_row import VALIDATION_FILE, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
@@ -88,22 +88,23 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     if not found:
         raise MissingEvidenceError("validation.parquet of every training is missing")
     names = [training.method for training in found]
-    colour, dash = colours(names), dashes(names)
-    figure, (curves, falls) = new_figure(height=1.9 + 0.24 * len(found), columns=2)
+    looks = line_looks(names)
+    figure, (losses_of, falls) = new_figure(height=1.9 + 0.24 * len(found), columns=2)
     for place, training in enumerate(found):
-        look = {"color": colour[training.method], "ls": dash[training.method]}
-        curves.plot(training.after, training.loss, **look)
+        look = looks[training.method]
+        at = [int(np.argmin(np.abs(training.after - moment))) for moment in training.moments]
+        losses_of.plot(training.after, training.loss, markevery=at, **look)
         for moment, (point, lower, upper) in zip(training.moments, training.spread, strict=True):
-            curves.errorbar(
-                [moment], [point], yerr=[[point - lower], [upper - point]], fmt="o", ms=3,
-                capsize=2, color=colour[training.method],
+            losses_of.errorbar(
+                [moment], [point], yerr=[[point - lower], [upper - point]], fmt="none",
+                capsize=2, color=look["color"],
             )  # fmt: skip
-        _fall(falls, place, training, colour[training.method])
+        _fall(falls, place, training, look)
     for moment in sorted({training.moments[0] for training in found}):
-        curves.axvline(moment, color=GREY, lw=0.8)
-    curves.set_ylim(bottom=0.0)
-    curves.set_xlabel("updates (line: three quarters)")
-    curves.set_ylabel("validation loss, over its first")
+        losses_of.axvline(moment, color=GREY, lw=0.8)
+    losses_of.set_ylim(bottom=0.0)
+    losses_of.set_xlabel("updates (line: three quarters)")
+    losses_of.set_ylabel("validation loss, over its first")
     labels = [f"{t.method}{' (by samples)' if t.candidate else ''}" for t in found]
     falls.set_yticks(np.arange(len(found)), labels)
     falls.set_ylim(len(found) - 0.4, -0.9)
@@ -113,16 +114,16 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     draw_limit(falls, report, LIMIT)
     # The names at the right stand at rows of another panel, which says nothing of these curves.
     for name in in_order(names):
-        curves.plot([], [], color=colour[name], ls=dash[name], label=name)
+        losses_of.plot([], [], label=name, **looks[name])
     figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 
-def _fall(axes: Axes, place: int, training: Training, colour: str) -> None:
+def _fall(axes: Axes, place: int, training: Training, look: Mapping[str, Any]) -> None:
     point, lower, upper = training.fall
-    axes.hlines(place, lower, upper, color=colour, lw=2)
-    face = "white" if training.candidate else colour
-    axes.plot([point], [place], "o", color=colour, markerfacecolor=face, ms=5)
+    axes.hlines(place, lower, upper, color=look["color"], lw=2)
+    face = "white" if training.candidate else look["color"]
+    axes.plot([point], [place], **{**look, "ls": "", "ms": 5}, markerfacecolor=face)
 
 
 def _table(evidence: Evidence, report: GateReport) -> Table:

@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 
 from gates.evidence import Evidence
 from gates.pages.figures import Plot, Table, colours, in_order, markers
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.densities import Agreement, agreement, densities
 from gates.reproducibility.settings import DENSITY
+from gates.words import share_between
 from genpolicy.pages.figures.drawing import GREY, in_percent, new_figure
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.feasibility.candidates import admissible
 from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, LAYERS
-from gates.pages.figures import Plot, colours, dashes, in_order
+from gates.pages.figures import Plot, colours, dashes, in_order, markers
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from genpolicy.evidence.rows.shadow import CandidateRow
@@ -73,16 +73,17 @@ def _distribution(
     evidence: Evidence, report: GateReport, *, column: str, by: str, label: str, name: str
 ) -> Figure:
     frame = _admitted(evidence, column)
-    colour, dash = colours(frame["method"]), dashes(frame[by])
+    colour, dash, shape = colours(frame["method"]), dashes(frame[by]), markers(frame["method"])
     figure, (axes,) = new_figure(height=3.4 if by == "mode" else 2.8)
     for method in in_order(frame["method"]):
         own = frame[frame["method"] == method]
         if by == "mode":
-            _draw_curve(axes, own[column], f"{method} · all", color=colour[method], lw=2.6)
+            look = {"color": colour[method], "marker": shape[method], "lw": 2.6}
+            _draw_curve(axes, own[column], f"{method} · all", **look)
         for name_of, rows in own.groupby(by):
             text = method if by == "method" else f"{method} · {name_of}"
-            look = {"color": colour[method], "ls": dash[str(name_of)], "lw": 1.2}
-            _draw_curve(axes, rows[column], text, **look)
+            look = {"color": colour[method], "marker": shape[method], "lw": 1.2}
+            _draw_curve(axes, rows[column], text, ls=dash[str(name_of)], **look)
     axes.axhline(0.95, color=GREY, lw=0.8)
     axes.set_ylim(0, 1.12)
     in_percent(axes.yaxis)
@@ -96,11 +97,14 @@ def _distribution(
 
 
 def _draw_curve(axes: Axes, column: "pd.Series[float]", text: str, **look: Any) -> None:
-    """Share of values that are at most this, at 200 of them or fewer."""
+    """Share of values that are at most this, at 200 of them or fewer; a mark at the median."""
     values = np.sort(np.abs(column.to_numpy(dtype=np.float64)))
     kept = values[np.linspace(0, len(values) - 1, min(len(values), 200)).astype(int)]
     share = np.linspace(1 / len(kept), 1, len(kept))
-    axes.step(kept, share, where="post", label=f"{text} (n = {len(values)})", **look)
+    axes.step(
+        kept, share, where="post", label=f"{text} (n = {len(values)})", ms=4,
+        markevery=[len(kept) // 2], **look,
+    )  # fmt: skip
 
 
 def _projection(evidence: Evidence, report: GateReport) -> Figure:

@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.pages.figures import Listing, Plot, Table, colours, in_order, markers
+from gates.pages.figures import Listing, Plot, Table, colours, dashes, in_order, markers
 from gates.report import GateReport
 from gates.reproducibility.front import (
     SWEEP,
@@ -52,7 +52,7 @@ def _sweeps(evidence: Evidence, report: GateReport) -> Sweeps:
 
 def _front(evidence: Evidence, report: GateReport) -> Figure:
     sweeps = _sweeps(evidence, report)
-    colour, shape = colours(sweeps), markers(sweeps)
+    colour, shape, dash = colours(sweeps), markers(sweeps), dashes(sweeps)
     figure, places = new_figure(columns=3)
     for method, (settings, _, _) in sweeps.items():
         kept = efficient(settings)
@@ -60,12 +60,14 @@ def _front(evidence: Evidence, report: GateReport) -> Figure:
             times = [setting.answer_s * MILLI for setting in settings]
             line = [at for at, on in zip(zip(times, heights, strict=True), kept, strict=True) if on]
             if line:
-                axes.plot(*zip(*sorted(line), strict=True), color=colour[method], lw=0.9)
+                way = {"color": colour[method], "ls": dash[method], "lw": 0.9}
+                axes.plot(*zip(*sorted(line), strict=True), **way)
             for at, height, on in zip(times, heights, kept, strict=True):
                 face = colour[method] if on else "white"
                 look: dict[str, Any] = {"color": colour[method], "marker": shape[method], "ms": 4}
                 axes.plot([at], [height], markerfacecolor=face, **look)
-        places[0].plot([], [], shape[method], color=colour[method], label=method)
+        look = {"color": colour[method], "marker": shape[method], "ls": dash[method], "lw": 0.9}
+        places[0].plot([], [], label=method, **look)
     names = ("every mode reached, share", "chunk error, normalised", "jerk p95, m/s³")
     for axes, name in zip(places, names, strict=True):
         for deadline_s in sorted({found[2] for found in sweeps.values()}):

@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.pages.figures import Plot, colours, dashes, in_order, markers
+from gates.pages.figures import Plot, colours, in_order, line_looks, markers
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from gates.stress.rollouts import ROLLOUTS
@@ -84,14 +84,17 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
     frame = frame[numbers(frame, "action_ticks") > 0]
     if len(frame) == 0:
         raise MissingEvidenceError("no rollout executed an action")
-    colour, dash = colours(frame["method"]), dashes(frame["method"])
+    methods = in_order(frame["method"])
+    looks = line_looks(methods)
     figure, (axes,) = new_figure(height=2.8)
-    for method in in_order(frame["method"]):
+    for method in methods:
         rows = frame[frame["method"] == method]
         ages = np.sort(numbers(rows, "action_age_p95_s"))
         kept = ages[np.linspace(0, len(ages) - 1, min(len(ages), 200)).astype(int)]
         share = np.linspace(1 / len(kept), 1, len(kept))
-        axes.step(kept, share, where="post", color=colour[method], ls=dash[method], label=method)
+        axes.step(
+            kept, share, where="post", label=method, markevery=[len(kept) // 2], **looks[method]
+        )
     axes.set_ylim(0, 1.12)
     in_percent(axes.yaxis)
     in_milli(axes.xaxis)

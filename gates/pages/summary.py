@@ -7,8 +7,9 @@ import re
 
 from gates.doubt import texts_once
 from gates.overrides import OVERRIDDEN, said
-from gates.pages.numbers import between, human, judged_at, limit_said, rests_on
+from gates.pages.numbers import judged_at, limit_said, rests_on
 from gates.pages.table import deciding, not_asked, overridden, passed_by, stops, tally, waived
+from gates.readable import between, human
 from gates.report import NAMES, Answer, GateReport, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from itertools import groupby
 
-from gates.pages.numbers import human, limit_said
+from gates.pages.numbers import limit_said
+from gates.readable import human, measured_text
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
 from gates.verdicts import counting, decided_by, overridden_here, stopping
@@ -134,9 +135,7 @@ def deciding(report: GateReport) -> str:
 
 def against(criterion: Answer) -> str:
     """Measured against required, as a person reads numbers."""
-    pending = criterion.verdict == "PENDING_REVIEW"
-    found = "pending review" if pending else human(criterion, criterion.measured)
-    return f"{found}, required {limit_said(criterion)}"
+    return f"{measured_text(criterion)}, required {limit_said(criterion)}"
 
 
 def stops(report: GateReport) -> dict[str, str]:

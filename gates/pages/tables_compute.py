@@ -5,11 +5,11 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
 from gates.pages.bound import require_bound
 from gates.pages.figures import Listing, Table
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.compute import COMPUTE, Cost, cost_of
 from gates.reproducibility.convergence import last_quarter, updates_of
 from gates.reproducibility.settings import GENERATORS, chosen_nfe
+from gates.words import share_between
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.rows.reproducibility import PARTS
 

@@ -17,9 +17,9 @@ from gates.feasibility.settings import (
     UNKNOWN,
 )
 from gates.pages.figures import Folded, Listing, Table, in_order
-from gates.pages.numbers import share_between
 from gates.pages.reasons import REASON_WORDS, said
 from gates.report import GateReport
+from gates.words import share_between
 from genpolicy.evidence.rows.shadow import CandidateRow
 
 LAYER_OF = {name: layer for layer, _, name in (row.partition(".") for row in CHECKS_ASKED_FOR)}

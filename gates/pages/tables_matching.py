@@ -3,11 +3,11 @@
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.figures import Listing, Table
 from gates.pages.limits import limit_of
-from gates.pages.numbers import share_between
 from gates.report import GateReport
 from gates.reproducibility.convergence import Fall
 from gates.reproducibility.matching import pairs
 from gates.reproducibility.settings import GENERATORS
+from gates.words import share_between
 
 LIMIT = "baseline_fall_upper"
 HEADS = (
@@ -53,7 +53,7 @@ RULES = Listing(
     "Matched by two rules: equal updates, equal convergence",
     "One comparison is run, at equal updates; this is what each rule says of it. Equal convergence "
     f"asks the same of both sides: the loss falls by no more than the limit of {LIMIT} over the "
-    "last quarter, at the worse end over held-out episodes. `near its end` is the update from "
+    "last quarter, at the worse end over held-out episodes. Near its end: the update from "
     "which on the loss was no further above its end than that share, as far as it was measured. "
     "What remains to a baseline is a criterion, since it may be all of a gain. What remains to a "
     "candidate it pays for itself, and of a density something remains however long it is trained; "

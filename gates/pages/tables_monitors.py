@@ -7,7 +7,6 @@ import pandas as pd
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
-from gates.pages.numbers import share_between
 from gates.report import GateReport, parse_section, report_path
 from gates.stress.monitors import (
     ALARMS,
@@ -21,7 +20,7 @@ from gates.stress.monitors import (
     watched_of,
 )
 from gates.stress.rollouts import StressSettings
-from gates.words import percent
+from gates.words import percent, share_between
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorUnavailableRow
 
 UNAVAILABLE = f"{MONITORS}/unavailable.parquet"

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from gates.evidence import Evidence
 from gates.pages.bound import require_bound
-from gates.pages.figures import Listing, Plot, Table, colours, dashes, in_order
+from gates.pages.figures import Listing, Plot, Table, in_order, line_looks
 from gates.report import GateReport
 from gates.stress.curves import Curve, curves
 from gates.stress.rollouts import CURVES, ROLLOUTS
@@ -51,19 +51,16 @@ def _draw(evidence: Evidence, report: GateReport) -> Figure:
     found = _curves(evidence, report)
     names = sorted({curve.condition for curve in found})
     methods = in_order([curve.method for curve in found])
-    colour, dash = colours(methods), dashes(methods)
+    looks = line_looks(methods)
     figure, axes = new_figure(columns=len(names), height=2.8)
     for place, name in zip(axes, names, strict=True):
         for curve in (one for one in found if one.condition == name):
             sizes = [point.severity for point in curve.points]
-            own = colour[curve.method]
-            place.plot(
-                sizes, [point.share for point in curve.points], "o",
-                color=own, ls=dash[curve.method], ms=3, label=curve.method,
-            )  # fmt: skip
+            own = looks[curve.method]
+            place.plot(sizes, [point.share for point in curve.points], label=curve.method, **own)
             place.vlines(
                 sizes, [point.lower for point in curve.points],
-                [point.upper for point in curve.points], color=own, lw=0.8,
+                [point.upper for point in curve.points], color=own["color"], lw=0.8,
             )  # fmt: skip
             for point in curve.points:
                 if point.judged:

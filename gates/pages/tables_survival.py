@@ -8,9 +8,9 @@ from gates.feasibility.candidates import admissible, episodes_of
 from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, SHADOW
 from gates.pages.bound import require_bound
 from gates.pages.figures import Listing, Table, in_order
-from gates.pages.numbers import share_between
 from gates.pages.reasons import said
 from gates.report import GateReport
+from gates.words import share_between
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow
 
 COUNTS = f"{SHADOW}/counts.parquet"

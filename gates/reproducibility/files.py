@@ -6,8 +6,8 @@ was trained is asked: a method of which only the best seed has rows was selected
 
 import contextlib
 
-from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.reproducibility.settings import GENERATORS, MODES, NFE, fixtures_of
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.reproducibility.settings import GENERATORS, MODES, NFE, allowed_nfe, fixtures_of
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.evidence.rows.reproducibility import NfeRow
@@ -76,13 +76,6 @@ def _listed(seeds: set[int]) -> str:
 
 
 def evaluations_said(evidence: Evidence, candidate: str) -> str:
-    """Network evaluations of a sample that the definition allows, as a card says them.
-
-    Raises:
-        MissingEvidenceError: None, or others of one training seed than of another.
-    """
-    rows = evidence.of(NFE, NfeRow, candidate)
-    pairs = set(zip(numbers(rows, "least"), numbers(rows, "most"), strict=True))
-    if len(pairs) != 1:
-        raise MissingEvidenceError(f"{NFE} allows {candidate} several counts of evaluations")
-    return " to ".join(f"{count:.0f}" for count in dict.fromkeys(next(iter(pairs))))
+    """Network evaluations of a sample that the definition allows, as a card says them."""
+    allowed = allowed_nfe(evidence, candidate)
+    return " to ".join(f"{count:.0f}" for count in dict.fromkeys(allowed))

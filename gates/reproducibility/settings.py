@@ -4,7 +4,6 @@ import datetime
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
@@ -108,6 +107,19 @@ class ReproducibilitySettings(CandidateSettings):
         )
 
 
+def allowed_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
+    """Fewest and most network evaluations of a sample that its sampler's definition allows.
+
+    Raises:
+        MissingEvidenceError: None, or others of one training seed than of another.
+    """
+    rows = evidence.of(NFE, NfeRow, candidate)
+    pairs = set(zip(numbers(rows, "least"), numbers(rows, "most"), strict=True))
+    if len(pairs) != 1:
+        raise MissingEvidenceError(f"{NFE} allows {candidate} several counts of evaluations")
+    return next(iter(pairs))
+
+
 def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     """Fewest and most network evaluations that a sample of the candidate may take.
 
@@ -117,10 +129,10 @@ def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     Raises:
         MissingEvidenceError: None, or several of a sampler that always takes the same.
     """
-    rows = evidence.of(NFE, NfeRow, candidate)
-    recorded, least, most = (numbers(rows, name) for name in ("recorded", "least", "most"))
-    if np.all(least < most):
-        return float(least.min()), float(most.max())
+    least, most = allowed_nfe(evidence, candidate)
+    if least < most:
+        return least, most
+    recorded = numbers(evidence.of(NFE, NfeRow, candidate), "recorded")
     lowest, highest = float(recorded.min()), float(recorded.max())
     if lowest != highest:
         raise MissingEvidenceError(f"{candidate} records several NFE: {lowest:g} to {highest:g}")

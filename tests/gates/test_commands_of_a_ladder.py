@@ -192,7 +192,8 @@ def test_judge_exits_0_on_fail(ladder, _run):
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     result = _run(ladder, "judge", "A")
     assert result.exit_code == 0
-    assert "Gate A: FAIL. lag_spread_rows: 4, required <= 1" in result.output
+    said = "Gate A: FAIL. lag_spread_rows: 4 action steps, required <= 1 action step\n"
+    assert said in result.output
 
 
 def test_verify_card_waits_for_people(ladder, capsys):

@@ -5,8 +5,8 @@ import re
 import evidence
 import pytest
 
-from gates.pages.numbers import human
 from gates.proof import judge
+from gates.readable import human
 from gates.writing import write_gate, write_index
 
 UNITS = (

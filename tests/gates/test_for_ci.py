@@ -27,7 +27,9 @@ def test_what_passes_is_a_test_without_a_word():
     found = cases([rung("PASS")], report(criterion("PASS")))
     (suite,) = suites(found)
     assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("Gate A", "1", "0")
-    assert not list(suite[0]) and suite[0].get("file") == "reports/gate_a.json"
+    assert [child.tag for child in suite[0]] == ["properties"] and suite[0].get(
+        "file"
+    ) == "reports/gate_a.json"
     assert as_github(found) == ""
 
 
@@ -37,7 +39,7 @@ def test_every_criterion_that_does_not_hold_is_red():
         found = cases([rung(verdict)], report(criterion("PASS"), criterion(verdict)))
         (suite,) = suites(found)
         assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
-        assert [child.get("type") for child in suite[1]] == [verdict]
+        assert [child.get("type") for child in suite[1]] == [None, verdict]
         assert as_github(found).startswith("::error file=reports/gate_a.json,title=Gate A%2C ")
 
 
@@ -47,8 +49,21 @@ def test_a_candidate_that_fell_beside_one_that_passes_blocks_nothing():
     found = cases([rung("PASS")], report(criterion("PASS"), fell))
     (suite,) = suites(found)
     assert (suite.get("failures"), suite.get("skipped")) == ("0", "1")
-    assert suite[1].get("name").endswith("(flow)") and suite[1][0].tag == "skipped"
+    assert suite[1].get("name").endswith("(flow)") and suite[1][1].tag == "skipped"
     assert as_github(found).startswith("::warning ")
+
+
+def test_a_reader_is_told_three_digits_and_a_machine_all_of_them():
+    told = {"id": "told_share", "question": "How much?", "measured": 0.507708123456,
+            "interval": (0.355647, 0.507708123456), "threshold": 0.5}  # fmt: skip
+    fell = criterion("INCONCLUSIVE").model_copy(update=told)
+    found = cases([rung("INCONCLUSIVE")], report(fell))
+    ((test,),) = suites(found)
+    assert "How much? 50.8 %, required <= 50 %" in test[1].get("message")
+    assert "50.8 %25, required <= 50 %25" in as_github(found)
+    assert {one.get("name"): float(one.get("value")) for one in test[0]} == {
+        "measured": 0.507708123456, "low": 0.355647, "high": 0.507708123456, "limit": 0.5,
+    }  # fmt: skip
 
 
 def test_a_report_that_is_not_there_or_not_true_is_one_red_test():
@@ -84,8 +99,17 @@ def test_golden_what_both_machines_are_told():
     assert as_junit(found).splitlines()[1:] == [
         '<testsuites name="genpolicy">',
         '  <testsuite name="Gate A" tests="2" failures="0" skipped="1">',
-        '    <testcase classname="Gate A" name="x" file="reports/gate_a.json" />',
+        '    <testcase classname="Gate A" name="x" file="reports/gate_a.json">',
+        "      <properties>",
+        '        <property name="measured" value="1.0" />',
+        '        <property name="limit" value="1.0" />',
+        "      </properties>",
+        "    </testcase>",
         '    <testcase classname="Gate A" name="y (flow)" file="reports/gate_a.json">',
+        "      <properties>",
+        '        <property name="measured" value="1.0" />',
+        '        <property name="limit" value="1.0" />',
+        "      </properties>",
         '      <skipped message="FAIL: ? 1, required &lt;= 1 (late)" />',
         "    </testcase>",
         "  </testsuite>",

@@ -69,7 +69,7 @@ def test_the_sentence_names_gate_criterion_numbers_report_and_next_step(ladder):
     _judge_again(ladder, "A")
     with pytest.raises(
         RefusedError,
-        match=r"Gate A refuses: mode_feasible_share is 0\.98, required >= 0\.99; "
+        match=r"Gate A refuses: mode_feasible_share is 98 %, required >= 99 %; "
         r"see reports/gate_a\.json\. Return to",
     ):
         admit("train_generators", ladder)

@@ -6,11 +6,10 @@ import pytest
 from pydantic import ValidationError
 
 from gates.proof import admit
+from gates.readable import limit_text, measured_text
 from gates.report import (
     SCHEMA_VERSION,
     StrictModel,
-    limit_text,
-    measured_text,
     message,
     parse_report,
     parse_section,
@@ -116,7 +115,7 @@ def test_what_was_measured_and_what_is_asked_in_a_sentence(ladder):
         other = answer.model_copy(update={"verdict": "FAIL", "comparison": "<="} | changes)
         return measured_text(other), limit_text(other)
 
-    assert said(measured=1 / 3, threshold=0.25) == ("0.333333", "<= 0.25")
+    assert said(measured=1 / 3, threshold=0.25) == ("0.333", "<= 0.25")
     assert said(measured=None, threshold=None) == ("not measured", "a limit in params.yaml")
     assert said(measured=0.0, threshold=0.0, comparison=">=") == ("0", ">= 0")
     assert said(measured=1.0, verdict="PENDING_REVIEW")[0] == "pending review"

@@ -36,6 +36,12 @@ def test_a_time_below_a_second_is_in_ms(value, said):
     assert words.duration(value) == said
 
 
+def test_an_interval_says_a_unit_once_that_both_ends_have():
+    assert words.span("35.6 %", "50.8 %") == "35.6 to 50.8 %" == words.percents(0.356, 0.508)
+    assert words.span("900 ms", "1.2 s") == "900 ms to 1.2 s"
+    assert words.share_between(0.481, 0.287, 0.681) == "48.1 % (28.7 to 68.1)"
+
+
 def test_a_length_below_a_metre_is_in_mm():
     assert (words.length(0.0094), words.length(1.5)) == ("9.4 mm", "1.5 m")
 

@@ -8,10 +8,11 @@ import shutil
 import evidence
 import pytest
 
-from gates.pages.numbers import human, judged_at
+from gates.pages.numbers import judged_at
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
 from gates.proof import judge
+from gates.readable import human
 from gates.report import Answer, report_bytes, report_path
 from gates.writing import changed_page, write_gate
 from genpolicy.errors import BadInputError, GenpolicyError

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from genpolicy.pages.figures.drawing import (
     BLUE,
@@ -133,6 +134,7 @@ def label_agreement(frame: pd.DataFrame) -> Figure:
         left = left + counts
     axes.set_yticks(np.arange(len(names)), names)
     axes.invert_yaxis()
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("replayed episodes")
     figure.legend(loc="outside lower center", ncols=3)
     return figure

@@ -98,6 +98,11 @@ def in_percent(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(100 * value, 9):g} %"))
 
 
+def in_points(axis: Axis) -> None:
+    """Differences of shares on an axis as points, the unit its label says."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(100 * value, 9):g}"))
+
+
 def in_milli(axis: Axis) -> None:
     """Metres or seconds on an axis in mm or ms; what is drawn stays in SI units."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(1000 * value, 9):g}"))

@@ -85,7 +85,7 @@ def test_what_speaks_ends_with_3(stands, honest, capsys):
     behind = "What lies behind it was not asked: feasibility, contact controller, evaluator."
     assert behind in " ".join(out.split())
     code, out, _ = run(capsys, "--symptom", "boundary-jump", "--candidate", "flow")
-    assert code == 3 and "SPEAKS: hold_share_upper: 0.05, required <= 0.25." in out
+    assert code == 3 and "SPEAKS: hold_share_upper: 5 %, required <= 25 %." in out
     assert "Before all: timing and queue (place 6 of 9) is RED." in out
     code, out, _ = run(capsys, "--candidate", "diffusion")
     assert code == 0
@@ -167,7 +167,7 @@ def test_a_symptom_whose_criterion_is_open_ends_as_the_walk_does(stands, honest,
     stands(turned(honest, "D.hold_share_upper", verdict, "flow"))
     code, out, _ = run(capsys, "--symptom", "boundary-jump", "--candidate", "flow")
     assert code == 3 == run(capsys, "--candidate", "flow")[0]
-    assert f"Not decided: hold_share_upper is {verdict}, required <= 0.25" in " ".join(out.split())
+    assert f"Not decided: hold_share_upper is {verdict}, required <= 25 %" in " ".join(out.split())
     assert "Look at what is not decided (normalization and queue age)" in out
 
 

@@ -17,18 +17,18 @@ def test_a_criterion_that_holds_is_a_number_and_no_cause(honest):
     look.criteria("D.hold_share_upper")
     (number,) = look.numbers
     assert number.where == "reports/gate_d.json: hold_share_upper of flow"
-    assert number.counted == "80 starts" and number.limit == "<= 0.25" and number.verdict == "PASS"
+    assert number.counted == "80 starts" and number.limit == "<= 25 %" and number.verdict == "PASS"
     assert look.causes == look.unknown == []
 
 
 def test_a_broken_one_speaks_and_an_open_one_is_not_decided(honest):
     look = Look(turned(honest, "D.hold_share_upper", "FAIL", FLOW), FLOW)
     look.criteria("D.hold_share_upper")
-    assert look.causes[0].startswith("hold_share_upper: 0.05, required <= 0.25. Worst in ")
+    assert look.causes[0].startswith("hold_share_upper: 5 %, required <= 25 %. Worst in ")
     look = Look(turned(honest, "D.hold_share_upper", "INCONCLUSIVE", FLOW), FLOW)
     look.criteria("D.hold_share_upper")
     assert look.causes == look.unknown == []
-    assert look.undecided[0].startswith("hold_share_upper is INCONCLUSIVE, required <= 0.25")
+    assert look.undecided[0].startswith("hold_share_upper is INCONCLUSIVE, required <= 25 %")
 
 
 def test_what_only_shows_the_symptom_is_no_cause_even_where_it_is_red(honest):
@@ -60,8 +60,8 @@ def test_a_mistake_of_ours_is_not_taken_for_missing_evidence(honest):
 
 def test_values_are_shown_with_their_interval(honest):
     answer = honest.answer("D.reset_upper", FLOW)
-    assert value_text(answer) == "0.0676878 (0.0003164 to 0.06769)"
-    assert value_text(answer.model_copy(update={"interval": None})) == "0.0676878"
+    assert value_text(answer) == "6.77 % (0.0316 to 6.77 %)"
+    assert value_text(answer.model_copy(update={"interval": None})) == "6.77 %"
 
 
 def test_a_share_is_exact_over_clusters_to_both_sides():

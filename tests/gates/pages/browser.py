@@ -46,6 +46,13 @@ addEventListener('load', () => {
   })
 })
 """
+SHOWN = """
+addEventListener('load', () => {
+  const page = document.querySelector('iframe').contentDocument
+  const shown = [...page.images].map((one) => one.complete && one.naturalWidth > 0)
+  document.querySelector('pre').textContent = JSON.stringify(shown)
+})
+"""
 
 
 def chromium() -> str | None:
@@ -90,6 +97,18 @@ def measured(text: str, folder: Path, *, width_px: int, paper: bool = False) -> 
     found = re.search(r"<pre>(\{.*\})</pre>", said, flags=re.DOTALL)
     assert found, said[-2000:]
     return json.loads(html.unescape(found.group(1)))
+
+
+def pictures(text: str, folder: Path) -> list[bool]:
+    """Whether each picture of a page is shown, its own policy about content being in force."""
+    inner, opened = html.escape(text, quote=True), folder / "pictures.html"
+    opened.write_text(
+        f'<!DOCTYPE html><iframe srcdoc="{inner}"></iframe><pre></pre><script>{SHOWN}</script>'
+    )
+    said = _run(["--dump-dom", opened.resolve().as_uri()])
+    found = re.search(r"<pre>(\[.*\])</pre>", said)
+    assert found, said[-2000:]
+    return json.loads(found.group(1))
 
 
 def _run(arguments: list[str]) -> str:

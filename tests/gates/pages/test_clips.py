@@ -5,6 +5,7 @@ import shutil
 from html.parser import HTMLParser
 
 import evidence
+import nu_checker
 import numpy as np
 import pandas as pd
 import pytest
@@ -191,6 +192,14 @@ class Controls(HTMLParser):
         for told, name in self.named:
             groups.setdefault(told["name"], []).append((name.strip(), "checked" in told))
         return groups
+
+
+@nu_checker.asked
+def test_the_nu_checker_says_nothing_of_a_desk_with_clips(watched, tmp_path):
+    write_gate(watched, "D")
+    page = index_page(watched)
+    assert page.count('<div class="clip"') >= 3
+    assert nu_checker.complaints({"clips": page}, tmp_path) == ""
 
 
 def test_each_clip_has_named_buttons_of_its_own_and_no_script(watched):

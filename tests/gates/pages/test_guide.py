@@ -2,7 +2,8 @@
 
 import pytest
 
-from gates.pages.guide import QUESTIONS, READING, USED, WORDS, label, unit
+from gates.pages.guide import QUESTIONS, READING, USED, WORDS, label
+from gates.readable import unit
 from gates.writing import write_gate
 
 

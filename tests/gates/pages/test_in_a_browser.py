@@ -80,6 +80,14 @@ def test_a_clip_can_be_read_and_shows_one_moment(tmp_path):
     assert on_paper(step, tmp_path)["buttons"] == 0
 
 
+def test_a_picture_inside_a_page_is_shown_under_its_own_policy(pages, tmp_path):
+    """The Nu checker says that the policy forbids it; what a browser shows is what counts."""
+    page = pages["gate_a"]
+    assert browser.pictures(page, tmp_path) == [True] == ["data:image/png" in page]
+    closed = page.replace("img-src data:", "img-src 'none'")
+    assert closed != page and browser.pictures(closed, tmp_path) == [False]
+
+
 def test_what_is_wrong_is_seen(tmp_path):
     small = '<svg viewBox="0 0 800 9"><text y="9" style="font-size:9px">a</text></svg>'
     plot = f'<div class="plot" style="--least:10px">{small}</div>'

@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from gates.evidence import Evidence
-from gates.pages.figures import METHODS, Plot, left_out
+from gates.pages.figures import METHODS, Plot, left_out, line_looks
 from gates.pages.page import PLOTS
 from gates.report import GateReport
 from genpolicy.pages.figures.drawing import STYLE, svg
@@ -29,6 +29,8 @@ NAMES = {colour.lower(): name for name, colour in METHODS.items()}
 CASES = [(gate, plot) for gate in "ABCD" for plot in PLOTS[gate] if isinstance(plot, Plot)]
 SCENE = ("x,", "y,", "z,", "action chunk,")
 """Positions in a scene of a metre, and actions, which have the unit of their contract."""
+MOST_OF_A_MARK = 2
+"""Points of what stands for an interval or a limit, and is no line of a method."""
 LEAST_SEVERAL = 8
 """Figures of the whole evidence in which several methods are told apart by colour."""
 
@@ -54,10 +56,14 @@ def _methods(axes: Axes) -> set[str]:
     return found
 
 
+def _legends(figure: Figure) -> list[Legend]:
+    own = [axes.get_legend() for axes in figure.axes]
+    return [*figure.legends, *(one for one in own if one is not None)]
+
+
 def _in_legends(figure: Figure) -> Iterator[tuple[str, str]]:
     """Of each entry the method whose colour its sample has, and what stands beside it."""
-    own = [axes.get_legend() for axes in figure.axes]
-    for legend in [*figure.legends, *(one for one in own if one is not None)]:
+    for legend in _legends(figure):
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
             for colour in _colours(handle) & set(NAMES):
                 yield NAMES[colour], text.get_text()
@@ -106,6 +112,39 @@ def test_an_axis_has_the_unit_that_a_person_uses(whole, judged, gate, plot):
             if label.startswith("share") or ": share" in label or label.endswith(", share"):
                 assert ticks and all(tick.endswith(" %") for tick in ticks), label
             assert not label.endswith((", s", ", m")) or label.startswith(SCENE), label
+
+
+def _alike(figure: Figure) -> set[tuple[str, str]]:
+    """Methods of whom two lines in a panel, or two samples of a legend, differ by colour alone."""
+    panels = [[one for one in axes.lines if one.get_linestyle() != "None"] for axes in figure.axes]
+    samples = [h for one in _legends(figure) for h in one.legend_handles if isinstance(h, Line2D)]
+    found = set()
+    for lines in (*panels, samples):
+        seen: dict[tuple[str, str], str] = {}
+        for line in lines:
+            name = NAMES.get(to_hex(line.get_color()))
+            if name is not None and (np.size(line.get_xdata()) > MOST_OF_A_MARK or line in samples):
+                look = (str(line.get_marker()), str(line._unscaled_dash_pattern))
+                other = seen.setdefault(look, name)
+                found |= {(other, name)} - {(name, name)}
+    return found
+
+
+@pytest.mark.parametrize(("gate", "plot"), CASES, ids=lambda value: getattr(value, "title", value))
+def test_a_line_is_told_without_its_colour(whole, judged, gate, plot):
+    """By its shape or its dash, where it is drawn and beside its name."""
+    assert _alike(_drawn(whole, judged(gate), plot)) == set()
+
+
+def test_lines_that_differ_by_colour_alone_are_seen():
+    figure, place = Figure(), [0.0, 1.0, 2.0]
+    axes = figure.subplots()
+    (one, other), looks = [*METHODS][:2], line_looks([*METHODS])
+    axes.plot(place, place, color=METHODS[one])
+    axes.plot(place, place, color=METHODS[other])
+    assert _alike(figure) == {(one, other)}
+    told = {(look["marker"], str(look["ls"])) for look in looks.values()}
+    assert len(told) == len(METHODS), "no two known methods look alike"
 
 
 def test_several_methods_are_seen_in_most_figures(whole, judged):

@@ -5,16 +5,8 @@ import re
 import pytest
 from test_verdicts import criterion
 
-from gates.pages.numbers import (
-    at_its_end,
-    between,
-    beyond,
-    human,
-    judged_at,
-    limit_said,
-    recounted,
-    rests_on,
-)
+from gates.pages.numbers import at_its_end, beyond, judged_at, limit_said, recounted, rests_on
+from gates.readable import between, human
 from gates.report import Recount
 
 
@@ -41,6 +33,16 @@ def of(**changes):
         ("boundary_jerk_p95_m_s3", 3250, 2031.7, "2,030 m/s³"),
         ("latency_p95_s", 0.4, 1e9, "1e+09 s"),
         ("latency_p95_s", 0.4, 0.9997, "1,000 ms"),
+        ("lag_spread_rows", 3, 1.0, "1 action step"),
+        ("lag_spread_rows", 3, 2.0, "2 action steps"),
+        ("told_share", 0.5, 0.500123, "50.01 %"),
+        ("told_share", 0.5, 0.500000001, "50.0000001 %"),
+        ("told_share", 0.5, 0.5, "50 %"),
+        ("latency_p95_s", 0.4, 0.39996, "399.96 ms"),
+        ("boundary_jerk_p95_m_s3", 3250, 3250.5, "3,250.5 m/s³"),
+        ("promotion_e_value", 60, 59.99, "59.99 to 1"),
+        ("admissible_share", 0.9975, 0.9975, "99.75 %"),
+        ("promotion_e_value", 100 / 3, 100 / 3, "33.3 to 1"),
     ],
 )
 def test_numbers_stand_in_the_unit_of_a_person(name, limit, value, text):
@@ -79,7 +81,7 @@ def test_each_number_that_is_no_count_says_what_it_is(judged):
     for gate in "ABCDE":
         for c in judged(gate).criteria:
             said = human(c, c.threshold)
-            if not re.search(r" (%|m?s|mm|m|N|m/s³|action steps|to 1)$|^×", said):
+            if not re.search(r" (%|m?s|mm|m|N|m/s³|action steps?|to 1)$|^×", said):
                 assert PLAIN.fullmatch(c.id), (c.id, said)
 
 

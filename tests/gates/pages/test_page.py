@@ -72,6 +72,13 @@ def test_the_markup_of_the_front_page_is_what_a_checker_takes(pages):
         ('<p id="a">b</p><p id="a">c</p>', "id a stands 2 times"),
         ("<div><p>a</div>", "div ends where p is open"),
         ("<div>", "stay open"),
+        ("<p><ul><li>a</li></ul></p>", "ul stands in p"),
+        ("<span><div>a</div></span>", "div stands in span"),
+        ('<img src="a">', "a picture has no text"),
+        ('<b class="a" class="b">c</b>', "b has an attribute twice"),
+        ('<div aria-label="a">b</div>', "div has a name and no role"),
+        ("<table><tr><td>a</td></tr><tr><td>a</td><td>b</td></tr></table>", "rows of [1, 2] cells"),
+        ('<table><tr><td colspan="2">a</td></tr><tr><td>a</td></tr></table>', "rows of [1, 2]"),
     ],
 )
 def test_the_checker_of_markup_sees_what_is_wrong(text, wrong):

@@ -28,6 +28,28 @@ def test_every_effect_is_drawn_once_in_the_panel_of_its_measure(whole, judged):
         assert sorted(drawn) == sorted(expected) and len(drawn) > 0
 
 
+def test_shares_are_percent_their_changes_points_and_what_they_are_means_of_is_said(whole, judged):
+    figure = PLOTS[0].draw(Evidence(whole), judged("A"))
+    error, *shares = figure.axes
+    frame = Evidence(whole).rows(EFFECTS, EffectRow)
+    (episodes,) = set(frame["episodes"])
+    for axes in figure.axes:
+        assert axes.get_xlabel().endswith(f"(n = {episodes} episodes)")
+    for axes in shares:
+        assert all(text.get_text().endswith(" %") for text in axes.texts) and axes.texts
+        assert "points" in axes.get_xlabel() and axes.xaxis.get_major_formatter()(0.25) == "25"
+    assert not any("%" in text.get_text() for text in error.texts)
+
+
+def test_panels_of_other_episodes_say_from_how_many_to_how_many(copied, judged):
+    def fewer(frame):
+        return frame.assign(episodes=[1200 if n else 7 for n in range(len(frame))])
+
+    evidence.edit_table(copied, TABLE, fewer)
+    said = [a.get_xlabel() for a in PLOTS[0].draw(Evidence(copied), judged("A")).axes]
+    assert any(text.endswith("(n = 7 to 1,200 episodes)") for text in said)
+
+
 def test_the_order_of_the_rows_is_no_order_of_the_figure(copied, whole, judged):
     evidence.edit_table(copied, TABLE, lambda f: f.iloc[::-1])
     for one, other in zip(_effects(copied, judged), _effects(whole, judged), strict=True):

@@ -114,7 +114,8 @@ def test_the_summary_of_what_fails_and_what_is_missing_says_so(copied: Path):
 
 def test_a_number_is_the_same_on_the_page_and_in_the_summary(judged):
     """Milliseconds, millimetres and percent are what both print."""
-    from gates.pages.numbers import human, limit_said
+    from gates.pages.numbers import limit_said
+    from gates.readable import human
 
     seen = set()
     for gate in "ABCD":

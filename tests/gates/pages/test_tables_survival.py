@@ -6,9 +6,9 @@ import pytest
 from gates.evidence import Evidence
 from gates.feasibility.settings import CANDIDATES
 from gates.pages.figures import draw_all
-from gates.pages.numbers import share_between
 from gates.pages.tables_survival import COUNTS, LISTINGS
 from gates.proof import judge
+from gates.words import share_between
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE, BALANCE = (path.removeprefix("artifacts/") for path in (CANDIDATES, COUNTS))

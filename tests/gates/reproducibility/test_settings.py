@@ -6,6 +6,7 @@ from asked import settings_of
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
+from gates.reproducibility.files import evaluations_said
 from gates.reproducibility.settings import chosen_nfe
 from genpolicy.errors import ConfigError
 
@@ -30,6 +31,23 @@ def test_a_candidate_that_records_several_nfe_has_chosen_none(ladder):
     evidence.edit_table(ladder, NFE, second)
     with pytest.raises(MissingEvidenceError, match="flow records several NFE: 8 to 16"):
         chosen_nfe(Evidence(ladder), "flow")
+
+
+def test_trainings_whose_definitions_allow_other_counts_have_chosen_none(ladder):
+    def second(frame):
+        return evidence.pd.concat([frame, frame.assign(seed=1, most=61)], ignore_index=True)
+
+    evidence.edit_table(ladder, NFE, second)
+    for asked in (chosen_nfe, evaluations_said):
+        with pytest.raises(MissingEvidenceError, match="allows flow several counts"):
+            asked(Evidence(ladder), "flow")
+
+
+def test_a_card_says_what_the_definition_allows_whatever_was_recorded(ladder):
+    evidence.edit_table(ladder, NFE, lambda f: f.assign(recorded=4))
+    assert evaluations_said(Evidence(ladder), "flow") == "8"
+    evidence.edit_table(ladder, NFE, lambda f: f.assign(least=4, most=61))
+    assert evaluations_said(Evidence(ladder), "flow") == "4 to 61"
 
 
 @pytest.mark.parametrize("share", [0.001, 0.5])

@@ -5,10 +5,12 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import nu_checker
 import numpy as np
 import pandas as pd
 import pytest
 from audited_cases import CASES, document
+from markup import Markup
 from planar import LIMITS
 
 from genpolicy.pages.audit.evidence import read_evidence
@@ -52,6 +54,16 @@ def test_a_page_loads_nothing_and_escapes_what_comes_from_data(pages, name):
     assert "a &lt;i&gt;task&lt;/i&gt;" in page and "&lt;b&gt;tcp&lt;/b&gt;" in page
     assert "<i>task" not in page and "<b>tcp" not in page
     assert page.count("Not drawn") == {"one": 3}.get(name, 0)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_markup_is_what_a_checker_takes(pages, name):
+    assert Markup(pages[name]).wrong == []
+
+
+@nu_checker.asked
+def test_the_nu_checker_says_nothing_of_any_audit(pages, tmp_path):
+    assert nu_checker.complaints(pages, tmp_path) == ""
 
 
 def test_the_same_evidence_gives_the_same_bytes(audits, pages):

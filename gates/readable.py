@@ -1,0 +1,111 @@
+"""Numbers of a criterion as a person reads them, on pages and in a terminal: percent, ms, mm.
+
+The unit stands in the criterion's name, and its limit says whether it is a share. All digits
+stand in the JSON of the report.
+"""
+
+import math
+
+from gates.report import Answer
+from gates.words import DIGITS, in_milli, number, percent, span, three
+
+RATES = (
+    "_share",
+    "_lower",
+    "_upper",
+    "_margin",
+    "_disagreement",
+    "_coverage",
+    "_deviation",
+    "_gap",
+    "_reachable",
+    "_effect",
+)
+"""How names of shares end."""
+RATIO = "_ratio"
+"""In names of criteria that are held against no change, which is 1."""
+EVIDENCE = "_e_value"
+"""How names of evidence end: so much to 1."""
+UNITS: tuple[tuple[str, str], ...] = (
+    ("_m_s3", "m/s³"),
+    ("_m_s", "m/s"),
+    ("lag_spread_rows", "action steps"),
+    ("_s", "s"),
+    ("_m", "m"),
+    ("_n", "N"),
+)
+MOST_TYPED = 6
+"""Digits of a limit that somebody typed; one that is derived, like 1 / alpha, may have more."""
+MOST_DIGITS = 12
+"""Of a number when it is judged."""
+
+
+def unit(criterion: str) -> str:
+    """Unit of a criterion by the suffix of its name; empty for counts, shares and ratios."""
+    return next((text for suffix, text in UNITS if criterion.endswith(suffix)), "")
+
+
+def human(answer: Answer, value: float | None) -> str:
+    """A number in the unit that a person uses: ms, mm, percent; three digits.
+
+    More, where three would make what differs from the limit look like the limit: nobody believes
+    `50 %, required <= 50 %: FAIL`.
+
+    Args:
+        answer: The criterion, whose name says the unit and whose limit says whether it is a share.
+        value: The number, or its limit; None is "not measured".
+    """
+    if value is None:
+        return "not measured"
+    limit = answer.threshold
+    if limit is None:
+        return _in_unit(answer, value, DIGITS)
+    held = _in_unit(answer, limit, _typed(limit))
+    if value == limit:
+        return held
+    told = (_in_unit(answer, value, digits) for digits in range(DIGITS, MOST_DIGITS + 1))
+    return next((text for text in told if text != held), held)
+
+
+def measured_text(answer: Answer) -> str:
+    """What was measured, for a sentence."""
+    return (
+        "pending review" if answer.verdict == "PENDING_REVIEW" else human(answer, answer.measured)
+    )
+
+
+def limit_text(answer: Answer) -> str:
+    """The limit, for a sentence in a terminal."""
+    if answer.threshold is None:
+        return "a limit in params.yaml"
+    return f"{answer.comparison} {human(answer, answer.threshold)}"
+
+
+def between(answer: Answer) -> str:
+    """An interval, its unit said once: `35.6 to 50.8 %`; empty where there is none."""
+    if answer.interval is None:
+        return ""
+    low, high = answer.interval
+    return span(human(answer, low), human(answer, high))
+
+
+def _typed(limit: float) -> int:
+    """As many digits as a limit has."""
+    for digits in range(DIGITS, MOST_TYPED + 1):
+        if math.isclose(float(f"{limit:.{digits}g}"), limit, rel_tol=1e-12):
+            return digits
+    return DIGITS
+
+
+def _in_unit(answer: Answer, value: float, digits: int) -> str:
+    suffix = unit(answer.id)
+    if suffix in ("s", "m"):
+        return in_milli(value, suffix, digits=digits)
+    text = three(value, digits=digits)
+    if suffix:
+        return f"{text} {suffix.removesuffix('s') if text == '1' else suffix}"
+    if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
+        return f"×{text}" if RATIO in answer.id else f"{text} to 1"
+    if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
+        return percent(value, digits=digits)
+    return number(value, digits=digits)
