@@ -59,7 +59,8 @@ def late_change_upper(
 ) -> Measured:
     """Upper bound, either way, of what the last quarter changes of the share of valid samples."""
     before, after = (
-        _valid(situations_of(evidence, candidate, table=table)) for table in (MODES_EARLIER, MODES)
+        _valid(situations_of(evidence, settings, candidate, table=table))
+        for table in (MODES_EARLIER, MODES)
     )
     if not before.index.equals(after.index):
         raise MissingEvidenceError("samples were not drawn at the same situations before and after")
