@@ -233,7 +233,10 @@ PARAMS: dict[str, Any] = {
     },
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
-    "measure_baselines": {"latent": {"method": "act"}},
+    "measure_baselines": {
+        "samples": 16,
+        "latent": {"method": "act", "convention": "z_prior", "permutations": 999},
+    },
     "train_factors": {"variants": {name: {} for name in VARIANTS}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "candidates": {},
