@@ -1,6 +1,6 @@
 """What pins a candidate: hashes of what lies there, a card that agrees with checkpoint and plan."""
 
-from gates.configured import entry_of, otherwise
+from gates.configured import CHECKPOINT, entry_of, otherwise
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
@@ -59,6 +59,7 @@ def unpinned(evidence: Evidence, settings: ReproducibilitySettings, candidate: s
         missing += otherwise(evidence, GENERATORS, candidate, first=settings.seeds[0])
         missing += _reference(evidence, settings)
         missing += _unlike_weights(evidence, candidate, entry)
+        missing += _unlike_seeds(evidence, candidate, entry)
     missing += _unlike_hashes(entry, config)
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
 
@@ -85,6 +86,16 @@ def _unlike_weights(evidence: Evidence, candidate: str, entry: CandidateIdentity
         if weights.precision != entry.card.precision:
             found.append(f"precision: {entry.card.precision}, {name} is {weights.precision}")
     return found
+
+
+def _unlike_seeds(evidence: Evidence, candidate: str, entry: CandidateIdentity) -> list[str]:
+    """Training seeds that are not those of the configurations that lie there."""
+    folders = folders_of(evidence, candidate).values()
+    own = sorted(evidence.document(folder, CHECKPOINT).training_seed for folder in folders)
+    if sorted(entry.seed) == own or says_nothing(entry.seed):
+        return []
+    said, trained = (", ".join(map(str, seeds)) for seeds in (sorted(entry.seed), own))
+    return [f"seed: {said}; its trainings have {trained}"]
 
 
 def _unlike_hashes(entry: CandidateIdentity, config: TrainedConfig) -> list[str]:
