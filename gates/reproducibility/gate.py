@@ -13,7 +13,7 @@ from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility import conformance, convergence, modes, timing, variations
 from gates.reproducibility.compute import cost_of, cost_said
-from gates.reproducibility.files import require_by_definition, require_nonfinite
+from gates.reproducibility.files import nonfinite_that_lie, require_by_definition
 from gates.reproducibility.fixtures import require_as_trained
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.matching import matched_by
@@ -114,9 +114,15 @@ def nonfinite_weights(
     entry = identity_of(evidence, candidate)
     found = float(entry.nonfinite_weights + entry.nonfinite_chunks)
     if candidate not in settings.brought:
-        require_nonfinite(evidence, candidate, entry)
-        chunks = f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
-        return Measured(found, caveat=chunks if entry.nonfinite_chunks else "")
+        lie, texts = nonfinite_that_lie(evidence, candidate), []
+        if lie != entry.nonfinite_weights:
+            texts.append(f"{entry.nonfinite_weights} weights are said to be none, {lie} are")
+        if entry.nonfinite_chunks:
+            texts.append(
+                f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
+            )
+        most = max(lie, entry.nonfinite_weights) + entry.nonfinite_chunks
+        return Measured(float(most), caveat="; ".join(texts))
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
     return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
 

@@ -126,7 +126,7 @@ PINS = [
     (IDENTITY, lambda d: d["flow"].update(sampler="e" * 64), "unpinned_items",
      "sampler: not the hash of the checkpoint's own"),
     (IDENTITY, lambda d: d["flow"].update(nonfinite_weights=1), "nonfinite_weights",
-     "1 weights of flow are said to be no numbers, and 0 that lie there are"),
+     "1 weights are said to be none, 0 are"),
     (FIXTURES, of_flow(lambda f: f.assign(sha256="e" * 64)), "samples_difference",
      "holds 0 of the 8 samples that training drew"),
     (FIXTURES, of_flow(lambda f: f.assign(checkpoint="e" * 64)), "samples_difference",
@@ -202,8 +202,7 @@ def test_weights_that_are_others_than_the_card_says_are_counted(repo):
 def test_a_weight_that_is_no_number_is_counted_where_it_lies(repo, value):
     file = repo / "artifacts/train_generators/flow/seed_0/model.safetensors"
     file.write_bytes(evidence.weights("flow", (0.5,) * 99 + (value,)))
-    said = held(repo, "nonfinite_weights")
-    assert said == "0 weights of flow are said to be no numbers, and 1 that lie there are"
+    assert held(repo, "nonfinite_weights") == "0 weights are said to be none, 1 are"
     forged(repo, IDENTITY, lambda d: d["flow"].update(nonfinite_weights=1))
     assert asked(repo, CRITERIA["nonfinite_weights"], "flow", gate="B").value == 1.0
 
