@@ -30,6 +30,8 @@ ACTIONS = (
     "reject_stale", "fallback",
 )  # fmt: skip
 """What may be declared (`genpolicy.contract.latency.DeadlineAction`)."""
+NONE = (np.inf, -np.inf)
+"""Ends of a term that nobody declared: no draw lies between them."""
 DECLARED = "declared, not measured"
 """Said of latency terms that somebody wrote down."""
 # A root of an integral, asked anew for every method with the same numbers.
@@ -53,8 +55,13 @@ def latency_terms_missing(
     seconds = rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan)
     taken = (rows["source"] == "measured").to_numpy()
     measured = set(rows.loc[taken & np.isfinite(seconds), "component"])
-    # Of a term that was written down every draw is: one that is none was written by nobody.
-    wrong = set(rows.loc[~taken & ~(np.isfinite(seconds) & (seconds >= 0.0)), "component"])
+    # Of a term that was written down every draw lies between its ends: another one nobody wrote.
+    least, most = (
+        rows["component"].map(lambda term, end=end: settings.declared.get(term, NONE)[end])
+        for end in (0, 1)
+    )
+    drawn = np.isfinite(seconds) & (seconds >= least.to_numpy()) & (seconds <= most.to_numpy())
+    wrong = set(rows.loc[~taken & ~drawn, "component"])
     declared = sorted(set(rows.loc[~taken, "component"]) - wrong - measured)
     missing = [
         term

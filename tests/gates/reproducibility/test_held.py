@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from asked import asked
+from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.proof import SPECS
@@ -140,6 +141,17 @@ PINS = [
      lambda f: f.assign(recorded=9, counted=9, expected=9, least=9, most=9), "nfe_mismatch",
      "allows flow 9 to 9 evaluations; by its definition euler takes 8 to 8"),
 ]  # fmt: skip
+DECLARED = [
+    (LATENCY, cells("seconds", seconds, where=lambda f: f["component"] == "network"),
+     "latency_terms_missing", "missing: network; ")
+    for seconds in (0.0, 0.01)
+]  # fmt: skip
+LEARNED = [
+    ("train_baselines/act/seed_0/validation.parquet", change, "baseline_fall_upper",
+     "act/seed_0/validation.parquet has ")
+    for change in (lambda f: f[f["episode_uuid"] != "e1"], lambda f: f.assign(windows=1),
+                   lambda f: f.replace({"episode_uuid": {"e1": "e99"}}))
+]  # fmt: skip
 MODELLED = [
     (MODEL, lambda f: f.assign(measured_s=f["drawn_s"], **UNKNOWN), "latency_model_ratio_upper",
      "flow: what model.parquet says was measured is not what the times"),
@@ -153,7 +165,7 @@ MODELLED = [
     (MODEL, lambda f: f[(f["method"] != "act") | (f["process"] < 3)], "latency_model_ratio_upper",
      "act: artifacts/latency/model.parquet does not hold each timed process once"),
 ]  # fmt: skip
-FORGED = [*PLANNED, *SITUATIONS, *CONFIGURED, *CARD, *PINS, *MODELLED]
+FORGED = [*PLANNED, *SITUATIONS, *CONFIGURED, *CARD, *PINS, *DECLARED, *LEARNED, *MODELLED]
 
 
 @pytest.mark.parametrize(("path", "change", "criterion", "said"), FORGED)
