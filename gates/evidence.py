@@ -195,6 +195,15 @@ class Evidence:
         self._touched[path] = None
         return self._materials[path] if self.bind(path) else ""
 
+    def content(self, path: str) -> bytes:
+        """The bytes of a file that is neither a table nor a document.
+
+        Raises:
+            MissingEvidenceError: No such file.
+        """
+        self._touched[path] = None
+        return self._read(path)
+
     def _table(self, path: str) -> pa.Table:
         self._touched[path] = None
         if path not in self._tables:

@@ -34,6 +34,10 @@ class NeedSettings(GateSettings):
             it loses in Gate D.
         may_differ: Settings that may differ between methods, each with its reason.
         redraws: Candidates that a policy may draw until one is admissible, as in the comparison.
+        samples: Candidates drawn at each two-mode situation.
+        seeds: Numbers of the training seeds; the first is the one that is deployed.
+        latent_convention: How the latent is drawn where it is tested.
+        permutations: Of the test of the latent.
         latent_baseline: Baseline whose latent must answer the observation.
         factors: Factors of which each must have been changed alone.
         conditioning_factors: Factors that could make a density unnecessary; a head is what the
@@ -50,6 +54,10 @@ class NeedSettings(GateSettings):
         "latent_baseline": "measure_baselines.latent.method",
         "may_differ": PLACE,
         "redraws": "stress.samples",
+        "samples": "measure_baselines.samples",
+        "seeds": "policy.seeds",
+        "latent_convention": "measure_baselines.latent.convention",
+        "permutations": "measure_baselines.latent.permutations",
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
@@ -62,7 +70,11 @@ class NeedSettings(GateSettings):
     one_mode: str = "one_mode_bc"
     may_differ: Listed
     redraws: int = Field(ge=1)
+    samples: int = Field(ge=1)
+    seeds: tuple[int, ...] = Field(min_length=1)
     latent_baseline: str
+    latent_convention: str
+    permutations: int = Field(ge=1)
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")
     waived_checks: dict[Owner, dict[str, Annotated[str, Field(pattern=r"\S")]]] = Field(

@@ -14,11 +14,10 @@ from gates.bounds import counted_interval, share_interval
 from gates.claim import SHOWN, trainings
 from gates.criterion import Measured, criterion
 from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
-from gates.may_differ import unmatched
+from gates.need.held import require_asked, require_latent, require_variant, unmatched_baselines
 from gates.need.settings import (
     MEASURED,
     MEASURED_FACTORS,
-    TRAINED,
     TRAINED_FACTORS,
     NeedSettings,
 )
@@ -44,7 +43,7 @@ VALID = (AtLeast("admissible", "samples"), AtLeast("modes_covered", 1))
 )
 def baselines_matched(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Settings in which the baselines differ although nothing allows it."""
-    return unmatched(evidence, TRAINED, settings.baselines, settings.may_differ)
+    return unmatched_baselines(evidence, settings)
 
 
 @criterion(
@@ -57,6 +56,7 @@ def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured
     method = settings.chunked_baseline
     deployed = is_one("convention", *settings.deployed_conventions)
     rows = evidence.of(MODES, ModeRow, method)
+    require_asked(evidence, rows, method, settings, table=MODES)
     found = valid_share(MODES, rows, deployed, confidence=settings.confidence)
     text = (
         f"an admissible chunk of {method} reaches a mode in {found.said}; upper bound over "
@@ -86,7 +86,9 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     subset = Subset(MODES, (is_one("convention", *settings.deployed_conventions), TWO_MODES))
     seeds: set[int] = set()
     for method in (*settings.remedies, settings.one_mode):
-        rows = subset.of(evidence.of(MODES, ModeRow, method))
+        stated = evidence.of(MODES, ModeRow, method)
+        require_asked(evidence, stated, method, settings, table=MODES)
+        rows = subset.of(stated)
         if len(rows) == 0:
             raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
         share, lower, upper = share_interval(
@@ -209,6 +211,7 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     entries = [entry for entry in evidence.document(MEASURED, LATENT) if entry.method == method]
     if not entries:
         raise MissingEvidenceError(f"{MEASURED}/{LATENT.file} has no test of {method}")
+    require_latent(evidence, entries, settings)
     found = []
     for entry in entries:
         ends = counted_interval(entry.exceeding, entry.permutations, confidence=settings.confidence)
@@ -266,6 +269,9 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     ]
     if not names:
         raise MissingEvidenceError("no variant changes the encoder, the history or the trunk")
+    for name in names:
+        own = frame[frame["variant"] == name]
+        require_variant(evidence, own, name, settings, table=FACTOR_MODES)
     # As many chances to look valid as there are variants: the level is divided among them.
     confidence = 1.0 - (1.0 - settings.confidence) / len(names)
     found = {
@@ -307,6 +313,7 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
     situations: dict[str, int] = {}
     for method in settings.baselines:
         rows = evidence.of(MODES, ModeRow, method)
+        require_asked(evidence, rows, method, settings, table=MODES)
         rows = rows[numbers(rows, "modes_present") >= 2]
         generative = method in settings.generative_baselines
         if not (generative or rows["convention"].isin(settings.deployed_conventions).any()):

@@ -34,12 +34,20 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
     heads = (
         "method", "denser mode drawn more often, share", "situations that can say", "episodes",
         "situations with a tie of samples",
+        "situations with a density that is infinite or no number",
     )  # fmt: skip
     found = [agreement(frame, name, confidence=confidence) for name in in_order(frame["method"])]
     return (
         heads,
         *(
-            (item.method, _text(item), f"{item.situations}", f"{item.episodes}", f"{item.tied}")
+            (
+                item.method,
+                _text(item),
+                f"{item.situations}",
+                f"{item.episodes}",
+                f"{item.tied}",
+                f"{item.unknown}",
+            )
             for item in found
         ),
     )
@@ -59,7 +67,8 @@ PLOTS = (
         "judged. Only heads that state a density have one, of the exact equation, where "
         "the samples are those of the few steps that are deployed; the diffusion's is blurred by "
         "its least noise, so that the two are not compared by height. A density is no share: a "
-        "narrow mode is dense and may be rare. "
+        "narrow mode is dense and may be rare. A situation in which the density of a mode is "
+        "infinite or no number has no mean: none of its modes is drawn, and the table counts it. "
         "With two modes, a density that knows nothing agrees in half of the situations.",
         DENSITY,
         _densities,

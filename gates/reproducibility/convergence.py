@@ -10,6 +10,7 @@ that it is compared with are asked by their loss, which is the stricter question
 must not be one over what they would have learned.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -59,7 +60,8 @@ def late_change_upper(
 ) -> Measured:
     """Upper bound, either way, of what the last quarter changes of the share of valid samples."""
     before, after = (
-        _valid(situations_of(evidence, candidate, table=table)) for table in (MODES_EARLIER, MODES)
+        _valid(situations_of(evidence, settings, candidate, table=table))
+        for table in (MODES_EARLIER, MODES)
     )
     if not before.index.equals(after.index):
         raise MissingEvidenceError("samples were not drawn at the same situations before and after")
@@ -108,6 +110,7 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
             found.append((fall.interval[1], method, fall))
         else:
             foreign.append(method)
+    _require_same_windows(evidence, [method for _, method, _ in found])
     upper, _, worst = max(found)
     each = "; ".join(f"{method} {_text(fall)}" for _, method, fall in found)
     text = f"validation loss falls: {each}" + (
@@ -115,6 +118,23 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
     )
     counted = f"{worst.episodes} episodes"
     return Measured(upper, worst.interval, text, counted=counted, point=worst.share)
+
+
+def _require_same_windows(evidence: Evidence, methods: Sequence[str]) -> None:
+    """Every training was measured on the same held-out windows: nobody left its worst ones out.
+
+    Raises:
+        MissingEvidenceError: One was measured on others.
+    """
+    known: dict[str, int] = {}
+    for method in methods:
+        for table, measured in losses(evidence, BASELINES, method).items():
+            own = measured["windows"].max(axis=1).to_dict()
+            if own != (known := known or own):
+                raise MissingEvidenceError(
+                    f"{table} has {len(own)} episodes with other held-out windows than "
+                    f"{methods[0]}, which has {len(known)}"
+                )
 
 
 def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: float) -> Fall:

@@ -27,7 +27,8 @@ class Agreement:
         share: Situations in which it is, of those that can say; NaN where none can.
         interval: Its exact interval over episodes.
         situations: Situations that can say.
-        tied: The others: two modes were drawn equally often, and none more often.
+        tied: Those in which two modes were drawn equally often, and none more often.
+        unknown: Those in which the density of a mode is infinite or no number.
         episodes: Episodes of those that can say.
     """
 
@@ -36,11 +37,15 @@ class Agreement:
     interval: tuple[float, float]
     situations: int
     tied: int
+    unknown: int
     episodes: int
 
 
 def densities(evidence: Evidence) -> pd.DataFrame:
     """Modes of every situation, with `share` of the samples and `gain` over the mean log-density.
+
+    Where the density of a mode is infinite or no number there is no mean, and `gain` is NaN for all
+    modes of the situation.
 
     Raises:
         MissingEvidenceError: No rows, situations without samples or with fewer than two modes, or
@@ -53,15 +58,20 @@ def densities(evidence: Evidence) -> pd.DataFrame:
     keys = ["method", *SITUATION]
     if rows.duplicated([*keys, "mode"]).any() or not (rows.groupby(keys).size() >= 2).all():
         raise MissingEvidenceError(f"{DENSITY} has a situation without its two modes, each once")
-    known = rows.assign(log_density=numbers(rows, "log_density"), share=reached / drawn)
-    mean = known.groupby(keys)["log_density"].transform("mean")
+    stated = rows["log_density"].to_numpy(dtype=np.float64, na_value=np.nan)
+    known = rows.assign(log_density=np.where(np.isfinite(stated), stated, np.nan))
+    known = known.assign(share=reached / drawn)
+    mean = known.groupby(keys)["log_density"].transform(lambda values: values.mean(skipna=False))
     return known.assign(gain=known["log_density"] - mean)
 
 
 def agreement(rows: pd.DataFrame, method: str, *, confidence: float) -> Agreement:
     """Agreement of one method over its situations, of `densities`."""
-    hits, episodes, tied = [], [], 0
+    hits, episodes, tied, unknown = [], [], 0, 0
     for (_, episode, _), modes in rows[rows["method"] == method].groupby(SITUATION):
+        if modes["gain"].isna().any():
+            unknown += 1
+            continue
         shares = modes["share"].to_numpy()
         if int((shares == shares.max()).sum()) > 1:
             tied += 1
@@ -74,4 +84,4 @@ def agreement(rows: pd.DataFrame, method: str, *, confidence: float) -> Agreemen
             np.array(hits), episodes, confidence=confidence, favourable=True
         )
         interval = (ends[0], ends[1])
-    return Agreement(method, share, interval, len(hits), tied, len(set(episodes)))
+    return Agreement(method, share, interval, len(hits), tied, unknown, len(set(episodes)))

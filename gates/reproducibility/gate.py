@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from gates.claim import CHECKPOINT_ONLY, trainings
+from gates.configured import unsaid
 from gates.criterion import Measured, criteria_of, criterion
 from gates.distilled import spent
 from gates.engine import GateSpec, Judged
@@ -11,13 +12,14 @@ from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility import conformance, convergence, modes, timing, variations
-from gates.reproducibility.compute import cost_of, cost_said, miscounted
-from gates.reproducibility.files import evaluations_said, unlike_files
+from gates.reproducibility.compute import cost_of, cost_said
+from gates.reproducibility.files import nonfinite_that_lie, require_by_definition
+from gates.reproducibility.fixtures import require_as_trained
 from gates.reproducibility.front import SWEEP
-from gates.reproducibility.identity import contradicted, says_nothing, unrecorded
-from gates.reproducibility.matching import matched_by, unsaid
+from gates.reproducibility.matching import matched_by
+from gates.reproducibility.pins import TOTAL, config_of, identity_of, unpinned
+from gates.reproducibility.planned import require_fixtures
 from gates.reproducibility.settings import (
-    BROUGHT_FOLDER,
     COVERAGE,
     DENSITY,
     GENERATORS,
@@ -26,15 +28,9 @@ from gates.reproducibility.settings import (
     SAMPLES,
     ReproducibilitySettings,
 )
-from genpolicy.evidence.documents.brought import BROUGHT, FAULTS, Brought
-from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
-from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
+from genpolicy.evidence.documents.brought import FAULTS
+from genpolicy.evidence.documents.given import MATCHED, DistilledConfig
 from genpolicy.evidence.rows.reproducibility import FIXTURES_ON, NfeRow, SampleRow
-from genpolicy.evidence.split import split_sha256
-from genpolicy.integrity.documents import read_json
-
-MANIFEST = "artifacts/ingest/manifest.json"
-TOTAL = "total"
 
 
 @criterion(
@@ -54,7 +50,7 @@ def unmatched_keys(
         )
         return Measured(1.0, caveat=text)
     found = unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
-    if hidden := unsaid(evidence, candidate):
+    if hidden := unsaid(evidence, GENERATORS, candidate):
         text = f"{', '.join(hidden)}: configured otherwise than the reference, and not listed"
         return Measured((found.value or 0.0) + len(hidden), caveat=text)
     return found
@@ -75,7 +71,7 @@ def parameter_budget_deviation(
     own = _parameters(evidence, GENERATORS, candidate)
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
-    config = _config(evidence, candidate)
+    config = config_of(evidence, candidate)
     text = f"{own:g} parameters, budget {budget:g} ({reference}); "
     text += cost_said(cost_of(evidence, candidate, config))
     if isinstance(config, DistilledConfig):
@@ -101,81 +97,7 @@ def unpinned_items(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Items that are not pinned by hash, not recorded, or not what the checkpoint says."""
-    entry = _identity(evidence, candidate)
-    pins = {
-        "checkpoint": entry.checkpoint,
-        "config": entry.config,
-        "dataset": entry.dataset,
-        "normalisation": entry.normalisation,
-        "seed": entry.seed,
-        "sampler": entry.sampler,
-    }
-    missing = [name for name, pin in pins.items() if says_nothing(pin)]
-    if candidate in settings.brought:
-        return _unpinned_of_brought(evidence, settings, candidate, missing)
-    missing += unlike_files(evidence, candidate, entry)
-    if entry.dataset != evidence.digest(MANIFEST):
-        missing.append("dataset: trained on another one than the audited")
-    config = _config(evidence, candidate)
-    missing += unrecorded(entry.card)
-    own = config.provenance.get("episodes_sha256") or _split(evidence)
-    counts = evaluations_said(evidence, candidate)
-    missing += contradicted(entry, config, split=own, evaluations=counts)
-    missing += miscounted(cost_of(evidence, candidate, config), config)
-    if entry.card.device != settings.device:
-        missing.append(f"device: ran on {entry.card.device}, compute.device is {settings.device}")
-    return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
-
-
-def _unpinned_of_brought(
-    evidence: Evidence, settings: ReproducibilitySettings, candidate: str, missing: list[str]
-) -> Measured:
-    """Of a policy behind the wire: its entry pins what it is, and says what is on the card."""
-    entry, brought = _identity(evidence, candidate), _brought(evidence, candidate)
-    if not brought.files:
-        missing.append("checkpoint file: its entry names none by hash")
-    if entry.checkpoint != brought.sha256:
-        missing.append("checkpoint: another entry was asked than stands in the stage candidates")
-    if brought.training_seed is None or entry.seed != [brought.training_seed]:
-        missing.append("seed: not the one that its entry declares")
-    text = "entry and files pinned by hash; what its maker declares is not checked"
-    if entry.dataset != evidence.digest(MANIFEST):
-        other = "dataset: trained on another one than the audited"
-        if candidate in settings.unmatched:
-            text += f"; {other}, by exception"
-        else:
-            missing.append(other)
-    elif entry.card.split and entry.card.split != _split(evidence):
-        missing.append("split: not that of the audited dataset, which it says it was trained on")
-    missing += unrecorded(entry.card)
-    return Measured(float(len(missing)), caveat=", ".join(missing) or text)
-
-
-def _split(evidence: Evidence) -> str:
-    """Of the audited dataset, whose manifest is bound already; empty where it has none."""
-    manifest = read_json(evidence.root / MANIFEST)
-    return split_sha256(manifest) if "split" in manifest else ""
-
-
-def _brought(evidence: Evidence, candidate: str) -> Brought:
-    entry = evidence.document(BROUGHT_FOLDER, BROUGHT).get(candidate)
-    if entry is None:
-        raise MissingEvidenceError(f"{BROUGHT_FOLDER}/{BROUGHT.file} has no entry of {candidate}")
-    return entry
-
-
-def _config(evidence: Evidence, candidate: str) -> TrainedConfig:
-    entry = evidence.document(GENERATORS, MATCHED).methods.get(candidate)
-    if entry is None:
-        raise MissingEvidenceError(f"{GENERATORS}/{MATCHED.file} has no entry of {candidate}")
-    return entry.config
-
-
-def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
-    entry = evidence.document(RELOAD, CANDIDATES).get(candidate)
-    if entry is None:
-        raise MissingEvidenceError(f"{RELOAD}/{CANDIDATES.file} has no entry of {candidate}")
-    return entry
+    return unpinned(evidence, settings, candidate)
 
 
 @criterion(
@@ -189,11 +111,18 @@ def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Weights and chunks that are not finite; behind the wire, answers without a finite chunk."""
-    entry = _identity(evidence, candidate)
+    entry = identity_of(evidence, candidate)
     found = float(entry.nonfinite_weights + entry.nonfinite_chunks)
     if candidate not in settings.brought:
-        chunks = f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
-        return Measured(found, caveat=chunks if entry.nonfinite_chunks else "")
+        lie, texts = nonfinite_that_lie(evidence, candidate), []
+        if lie != entry.nonfinite_weights:
+            texts.append(f"{entry.nonfinite_weights} weights are said to be none, {lie} are")
+        if entry.nonfinite_chunks:
+            texts.append(
+                f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
+            )
+        most = max(lie, entry.nonfinite_weights) + entry.nonfinite_chunks
+        return Measured(float(most), caveat="; ".join(texts))
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
     return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
 
@@ -220,7 +149,7 @@ def metadata_mismatches(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Metadata that a fresh process reads otherwise than they were written."""
-    return Measured(float(_identity(evidence, candidate).metadata_mismatches))
+    return Measured(float(identity_of(evidence, candidate).metadata_mismatches))
 
 
 @criterion(
@@ -243,10 +172,12 @@ def samples_difference(
         raise MissingEvidenceError("samples without a hash are said not to differ")
     if unequal and largest == 0.0:
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
+    require_fixtures(rows, settings, candidate)
     seeds = rows["seed"].nunique()
     text = f"{len(rows)} samples {trainings(seeds)}, {unequal} not bit-equal"
     if candidate not in settings.brought:
         text += _where_drawn(rows, settings.device)
+        require_as_trained(evidence, rows, candidate, identity_of(evidence, candidate))
     return Measured(largest, caveat=text)
 
 
@@ -281,6 +212,8 @@ def nfe_mismatch(evidence: Evidence, settings: ReproducibilitySettings, candidat
         raise MissingEvidenceError("a sample without a network evaluation was counted by nobody")
     if not np.all((least <= expected) & (expected <= most)):
         raise MissingEvidenceError("an expected count that its definition does not allow")
+    if candidate not in settings.brought:
+        require_by_definition(rows, candidate, config_of(evidence, candidate))
     difference = np.maximum(np.abs(recorded - counted), np.abs(expected - counted))
     text = (
         f"recorded {_range(recorded)}, counted {_range(counted)} at the network, "

@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gates.reproducibility.settings import ReproducibilitySettings
 from gates.words import HASH
 from genpolicy.evidence.documents.given import TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
@@ -13,6 +14,12 @@ MAY_BE_NONE = ("eta", "tolerance")
 """Of samplers that have none."""
 NEEDS = {"eta": ("ddim",), "tolerance": ("bosh3",)}
 """Samplers that are another one without it."""
+
+
+ALWAYS_THE_SAME = ("direct", "z_zero")
+"""Samplers of which an invocation draws one candidate, as all would be equal."""
+WARM_UP, THREADS = 10, 1
+"""Invocations before the first that is timed as warm; threads of what is trained here."""
 
 
 def says_nothing(value: object) -> bool:
@@ -61,6 +68,31 @@ def contradicted(
     if entry.seed[:1] != [config.training_seed] or len(entry.seed) != len(entry.checkpoints):
         found.append(f"seed: {entry.seed}, trained as {config.training_seed} first")
     return found
+
+
+def unplanned(
+    card: IdentityCard, settings: ReproducibilitySettings, *, draws: str | bool | None
+) -> list[str]:
+    """Items of the card that are another value than the plan and the regime give, with both.
+
+    Args:
+        card: The card.
+        settings: The plan.
+        draws: Name of its sampler, or whether its samples differ.
+    """
+    several = draws if isinstance(draws, bool) else draws not in ALWAYS_THE_SAME
+    own = {
+        "deadline_s": settings.deadline_s,
+        "candidates": settings.invocation_candidates if several else 1,
+        "warm_up": WARM_UP,
+    }
+    if not isinstance(draws, bool):  # another process has the threads that its maker says
+        own["threads"] = THREADS
+    return [
+        f"{name}: {getattr(card, name)}, planned {value}"
+        for name, value in own.items()
+        if not says_nothing(getattr(card, name)) and getattr(card, name) != value
+    ]
 
 
 def _as_trained(config: TrainedConfig) -> Mapping[str, Any]:

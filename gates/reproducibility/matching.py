@@ -7,9 +7,8 @@ whose side something remains. What remains to a baseline may be the whole gain o
 criterion (`baseline_fall_upper`). What remains to a candidate it pays for itself.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
@@ -23,10 +22,6 @@ from gates.reproducibility.convergence import (
 )
 from gates.reproducibility.settings import GENERATORS
 from gates.verdicts import judge_criterion, worst
-from genpolicy.evidence.documents.given import MATCHED
-
-COUNTED = ("weights_sha256", "parameters", "training_only_parameters", "flops", "distilled")
-"""Of a configuration what training counted and nobody set; budget and pins are held elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -75,38 +70,6 @@ class Pair:
         if self.candidate.done != "PASS":
             found.append(f"{self.candidate.method}, to its own cost")
         return "; ".join(found)
-
-
-def unsaid(evidence: Evidence, candidate: str) -> list[str]:
-    """Settings in which a candidate differs from the reference although nothing says so.
-
-    Training lists what differs; both configurations stand beside the list. That a method has a
-    name of its own is no setting, and what it is by definition is left out, as training does.
-
-    Raises:
-        MissingEvidenceError: One of the two configurations is not there.
-    """
-    said = evidence.document(GENERATORS, MATCHED)
-    for name in (candidate, said.reference):
-        if name not in said.methods:
-            raise MissingEvidenceError(f"{GENERATORS}/{MATCHED.file} has no entry of {name}")
-    config = said.methods[candidate].config
-    own = dict(_flat(asdict(config)))
-    other = dict(_flat(asdict(said.methods[said.reference].config)))
-    known = {"method", *said.differing_keys.get(candidate, ()), *said.one_mode_keys}
-    if config.horizons.get("prediction_horizon") == 1:
-        known |= set(said.single_action_keys)
-    return sorted(key for key in {*own, *other} - known if own.get(key) != other.get(key))
-
-
-def _flat(config: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in config.items():
-        if not place and key in COUNTED:
-            continue
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{place}{key}.")
-        else:
-            yield f"{place}{key}", value
 
 
 def trained(

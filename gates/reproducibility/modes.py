@@ -10,6 +10,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.recount import AtLeast, Subset, is_one, part_said, part_share
 from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
+from gates.situations import require_every_situation
 from gates.words import number, percent, share_of
 from genpolicy.evidence.rows.need import ModeRow
 
@@ -31,7 +32,7 @@ def mode_coverage_lower(
     """Lower bound of the share of situations of which every mode gets admissible samples enough."""
     found = []
     hit = AtLeast("fewest_admissible", "samples", settings.mode_minimum_share)
-    for seed, rows in situations_of(evidence, candidate).groupby("seed"):
+    for seed, rows in situations_of(evidence, settings, candidate).groupby("seed"):
         # There is one situation per episode and phase: those of one episode are one draw.
         share, lower, upper = share_interval(
             hit.holds(rows),
@@ -68,7 +69,7 @@ def outside_modes_upper(
 ) -> Measured:
     """Upper bound of the share of samples between two modes, or far from all of them."""
     found = []
-    for seed, rows in situations_of(evidence, candidate).groupby("seed"):
+    for seed, rows in situations_of(evidence, settings, candidate).groupby("seed"):
         between, far = counts(rows, "between_modes"), counts(rows, "far_from_modes")
         share, lower, upper = share_interval(
             (between + far) / numbers(rows, "samples"),
@@ -93,11 +94,14 @@ def outside_modes_upper(
     return Measured(upper, (lower, upper), text, counted=counted, recount=recount, point=share)
 
 
-def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> pd.DataFrame:
+def situations_of(
+    evidence: Evidence, settings: ReproducibilitySettings, candidate: str, *, table: str = MODES
+) -> pd.DataFrame:
     """Two-mode situations as the candidate answered them at the NFE that it records.
 
     Raises:
-        MissingEvidenceError: Without samples, or at another NFE.
+        MissingEvidenceError: Without samples, at another NFE, drawn in several ways, or not at
+            every situation that the audit names.
     """
     rows = evidence.of(table, ModeRow, candidate)
     if not np.all(numbers(rows, "samples") > 0):
@@ -106,4 +110,10 @@ def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> 
     nfe = numbers(rows, "nfe")
     if not np.all((nfe >= least) & (nfe <= most)):
         raise MissingEvidenceError("modes were not counted at the chosen NFE")
+    if rows["convention"].nunique() != 1:
+        raise MissingEvidenceError(f"{table} draws {candidate} in several ways")
+    planned = None if candidate in settings.brought else settings.seeds
+    require_every_situation(
+        evidence, rows, candidate, table=table, samples=settings.samples, seeds=planned
+    )
     return rows

@@ -63,6 +63,14 @@ class ReproducibilitySettings(CandidateSettings):
         mode_minimum_share: Share of the samples of a situation that must be admissible and reach
             a mode, for that mode to be covered.
         unmatched: Exceptions of candidates that were brought, by name.
+        fixtures: Observations whose samples must come back after reload.
+        seeds: Numbers of the training seeds; the first is the one that is promoted.
+        warm: Warm invocations of each timed process.
+        cold: Cold invocations of each timed process.
+        declared: Least and most of each term that this machine cannot measure, s.
+        samples: Candidates drawn at each two-mode situation.
+        invocation_candidates: Candidates that an invocation draws where it is deployed.
+        deadline_s: After which an answer is given up, s.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -71,7 +79,16 @@ class ReproducibilitySettings(CandidateSettings):
         "device": "compute.device",
         "may_differ": PLACE,
         "term_deadlines": "execution.term_deadlines",
+        "fixtures": "policy.fixtures",
+        "seeds": "policy.seeds",
+        "warm": "latency.warm",
+        "cold": "latency.cold",
+        "declared": "latency.declared",
+        "samples": "reload.samples",
+        "invocation_candidates": "stress.samples",
+        "deadline_s": "execution.deadline_s",
     }
+    whole: ClassVar[frozenset[str]] = frozenset({"declared"})
 
     baselines: tuple[str, ...] = Field(min_length=1)
     device: str
@@ -80,6 +97,14 @@ class ReproducibilitySettings(CandidateSettings):
     budget_reference: str
     mode_minimum_share: float = Field(gt=0.0, le=0.5)
     unmatched: dict[str, Unmatched] = Field(default_factory=dict)
+    fixtures: int = Field(ge=1)
+    seeds: tuple[int, ...] = Field(min_length=1)
+    warm: int = Field(ge=1)
+    cold: int = Field(ge=1)
+    declared: dict[str, tuple[float, float]]
+    samples: int = Field(ge=1)
+    invocation_candidates: int = Field(ge=1)
+    deadline_s: float = Field(gt=0.0)
 
     @model_validator(mode="after")
     def _exceptions_of_brought(self) -> "ReproducibilitySettings":

@@ -17,6 +17,8 @@ from gates.reproducibility.latency_budget import (
     WARM,
     spans_of_processes,
 )
+from gates.reproducibility.modelled import require_as_timed
+from gates.reproducibility.planned import require_repeats
 from gates.reproducibility.settings import ReproducibilitySettings
 from gates.words import duration, percent, three
 from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
@@ -28,6 +30,8 @@ ACTIONS = (
     "reject_stale", "fallback",
 )  # fmt: skip
 """What may be declared (`genpolicy.contract.latency.DeadlineAction`)."""
+NONE = (np.inf, -np.inf)
+"""Ends of a term that nobody declared: no draw lies between them."""
 DECLARED = "declared, not measured"
 """Said of latency terms that somebody wrote down."""
 # A root of an integral, asked anew for every method with the same numbers.
@@ -51,8 +55,13 @@ def latency_terms_missing(
     seconds = rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan)
     taken = (rows["source"] == "measured").to_numpy()
     measured = set(rows.loc[taken & np.isfinite(seconds), "component"])
-    # Of a term that was written down every draw is: one that is none was written by nobody.
-    wrong = set(rows.loc[~taken & ~(np.isfinite(seconds) & (seconds >= 0.0)), "component"])
+    # Of a term that was written down every draw lies between its ends: another one nobody wrote.
+    least, most = (
+        rows["component"].map(lambda term, end=end: settings.declared.get(term, NONE)[end])
+        for end in (0, 1)
+    )
+    drawn = np.isfinite(seconds) & (seconds >= least.to_numpy()) & (seconds <= most.to_numpy())
+    wrong = set(rows.loc[~taken & ~drawn, "component"])
     declared = sorted(set(rows.loc[~taken, "component"]) - wrong - measured)
     missing = [
         term
@@ -90,6 +99,7 @@ def _ratio_of_runs(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str, temperature: str
 ) -> Measured:
     rows = _latency(evidence, candidate)
+    require_repeats(rows, settings, candidate, temperature)
     wall, (first, second) = _compared(rows, temperature, settings.confidence)
     without = share = None
     if (alone := running(rows)) is not None:
@@ -211,8 +221,10 @@ def _held(
     high = rows[rows["level"] == P95]
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
         raise MissingEvidenceError(f"{method}: the p95 of several processes of both runs is needed")
-    if longer:
-        _require_every_process(evidence, method, high)
+    times = _latency(evidence, method)
+    require_repeats(times, settings, method, WARM)
+    _require_every_process(times, method, high)
+    require_as_timed(high, times, method, root_seed=settings.root_seed)
     pair = _times(high, "measured_s", "drawn_s", method)
     wall = _ratio(pair, longer=longer, confidence=settings.confidence)
     without = share = None
@@ -232,13 +244,12 @@ def _held(
     return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
 
 
-def _require_every_process(evidence: Evidence, method: str, high: pd.DataFrame) -> None:
+def _require_every_process(rows: pd.DataFrame, method: str, high: pd.DataFrame) -> None:
     """The model was held against every process that was timed, once.
 
     Raises:
         MissingEvidenceError: One was left out, or stands there twice.
     """
-    rows = _latency(evidence, method)
     timed = rows.loc[rows["source"] == "measured", ["run", "process"]].drop_duplicates()
     held = list(high[["run", "process"]].itertuples(index=False, name=None))
     if sorted(held) != sorted(timed.itertuples(index=False, name=None)):

@@ -1,13 +1,15 @@
 """Small synthetic evidence on which every gate passes, and the settings that judge it."""
 
 import base64
+import contextlib
 import copy
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import watched
@@ -20,6 +22,8 @@ from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.report import folder_of
+from gates.reproducibility.fixtures import TrainedFixture
+from gates.reproducibility.modelled import quantiles_of, uniforms
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
@@ -115,9 +119,10 @@ INVOCATIONS = 20
 OF_BROUGHT = {"B": {"conformance"}, "C": {"changed_answers"}, "D": {"changed_answers"}}
 """Criteria that are asked of those only who were brought; nobody is, here."""
 UPDATES = 4000
+PARAMETERS = 100
 SPLIT = {"split": {"rule": "episodes", "sha256": "5" * 64}}
-CONFIG = b"{}\n"
-"""Configuration file of every checkpoint, of which nothing is read here but its hash."""
+SAMPLER, STEPS = "euler", 8
+"""Of the candidates; one evaluation a step."""
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -198,13 +203,21 @@ VARIANTS = {
     "energy_head": ("head", "derivative_free", 16, ["method", "sampler.name"]),
     "single_action": ("temporal", "direct", 1, ["method"]),
 }
+DECLARED = {
+    term: [0.0005 * (term == "network"), 0.002] for term in TERMS if term not in MEASURED_HERE
+}
+"""Least and most of the terms that nobody can measure here, s."""
 PARAMS: dict[str, Any] = {
     "seed": 1,
     "compute": {"device": "cpu"},
     "confidence": 0.95,
     "comparison": {"may_differ": [["head", "what is compared"]]},
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
+    "policy": {"seeds": [0], "fixtures": 8},
+    "reload": {"samples": 16},
+    "latency": {"warm": 8, "cold": 8, "declared": DECLARED},
     "execution": {
+        "deadline_s": 0.15,
         "maximum_age_s": 0.45,
         "term_deadlines": [
             ["exposure", 0.05, "drop_observation"],
@@ -222,7 +235,10 @@ PARAMS: dict[str, Any] = {
     },
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
-    "measure_baselines": {"latent": {"method": "act"}},
+    "measure_baselines": {
+        "samples": 16,
+        "latent": {"method": "act", "convention": "z_prior", "permutations": 999},
+    },
     "train_factors": {"variants": {name: {} for name in VARIANTS}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "candidates": {},
@@ -406,6 +422,9 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
     if path == "stress/rollouts.parquet" and not {"recovery_attempted", "recovered"} - set(frame):
         table(root, "stress/recoveries.parquet", RecoveryRow, recoveries_of(frame))
+    if path == "latency/latency.parquet":
+        with contextlib.suppress(Exception):  # of times that are none there is no model
+            model_again(root)
     record(root)
 
 
@@ -463,6 +482,8 @@ def edit_document(root: Path, path: str, change: Any) -> None:
     file = root / "artifacts" / path
     value = json.loads(file.read_bytes())
     document(root, path, change(value) or value)
+    if path.endswith("matched.json"):
+        follow(root)
     record(root)
 
 
@@ -484,6 +505,7 @@ def build(root: Path) -> None:
     _factors(root)
     _generators(root)
     _reload(root)
+    follow(root)
     _latency(root)
     _candidates_drawn(root)
     _shadow(root)
@@ -861,6 +883,10 @@ def _example(i: int) -> dict[str, Any]:
     }
 
 
+NAMED = tuple(i for i in range(45) if i % 3)
+"""Held-out situations in which two routes persist: policies are put before each of them."""
+
+
 def _situation(i: int) -> dict[str, Any]:
     xs = [0.37 + 0.02 * k for k in range(16)]
     left = [v for x in xs for v in (x, 0.13 * (1 - abs(x - 0.5) / 0.2), 0.15)]
@@ -883,16 +909,18 @@ def _situation(i: int) -> dict[str, Any]:
         "mean_path": mean,
         "mode_paths": [left, right],
         "persistent": True,
-        "component": "position",
+        "component": "position" if i in NAMED or i % 3 == 0 else "timing",
     }
 
 
-def _modes(methods: tuple[str, ...], covered: int, *, nfe: int = 1) -> list[dict[str, Any]]:
+def _modes(
+    methods: tuple[str, ...], covered: int, *, nfe: int = 1, convention: str = "direct"
+) -> list[dict[str, Any]]:
     return [
         {
             "method": method,
             "seed": 0,
-            "convention": "direct",
+            "convention": convention,
             "episode_uuid": f"e{i}",
             "index": i,
             "samples": 16,
@@ -908,7 +936,7 @@ def _modes(methods: tuple[str, ...], covered: int, *, nfe: int = 1) -> list[dict
             "spread_m": 0.0,
         }
         for method in methods
-        for i in range(30)
+        for i in NAMED
     ]
 
 
@@ -924,9 +952,9 @@ def _offline(method: str) -> dict[str, Any]:
     }
 
 
-def _matched(methods: tuple[str, ...], *, dataset: str = "0" * 64) -> dict[str, Any]:
+def _matched(methods: tuple[str, ...], *, dataset: str) -> dict[str, Any]:
     sizes = {
-        "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
+        "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": PARAMETERS},
         "training_only_parameters": 0,
         "flops": {"encoder": 1, "trunk": 1, "head": 1, "total": 3},
     }
@@ -945,7 +973,7 @@ def _matched(methods: tuple[str, ...], *, dataset: str = "0" * 64) -> dict[str, 
         "head": HeadConfig().model_dump(mode="json"),
         "training": TrainingConfig(updates=UPDATES).model_dump(mode="json"),
         "training_seed": 0,
-        "sampler": SamplerConfig(name="direct").model_dump(mode="json"),
+        "sampler": SamplerConfig(name=SAMPLER, steps=STEPS).model_dump(mode="json"),
         "provenance": {
             "dataset_manifest_sha256": dataset,
             "action_contract_sha256": "a" * 64,
@@ -968,11 +996,76 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
     for method in methods:
         folder = root / "artifacts" / stage / method / "seed_0"
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "model.safetensors").write_bytes(method.encode())
-        (folder / "config.json").write_bytes(CONFIG)
+        (folder / "model.safetensors").write_bytes(weights(method))
+        (folder / "config.json").write_bytes(b"{}\n")  # of who is matched: `follow`
         given = {"episodes": ["e0", "e1"], "validation_episodes": ["e2"]}
         document(root, f"{stage}/{method}/seed_0/training.json", given)
         table(root, f"{stage}/{method}/seed_0/validation.parquet", ValidationRow, validation())
+
+
+def weights(
+    name: str, values: Sequence[float] = (0.5,) * PARAMETERS, *, kind: str = "F32"
+) -> bytes:
+    """A file of weights by hand: the length of its header, the header, one tensor."""
+    data = np.asarray(values, dtype={"F32": "<f4", "F64": "<f8"}[kind]).tobytes()
+    tensor = {"dtype": kind, "shape": [len(values)], "data_offsets": [0, len(data)]}
+    header = json.dumps({"__metadata__": {"name": name}, "w": tensor}).encode()
+    return len(header).to_bytes(8, "little") + header + data
+
+
+def checkpoint_sha256(folder: Path) -> str:
+    """Identity of the checkpoint that lies in a folder."""
+    files = (folder / "model.safetensors", folder / "config.json")
+    parts = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
+    return hashlib.sha256("".join(f"{part}\n" for part in parts).encode()).hexdigest()
+
+
+def follow(root: Path) -> None:
+    """Configurations, pins and fixtures as a training would have left them with `matched.json`."""
+    for stage in ("train_baselines", "train_generators"):
+        place = root / "artifacts" / stage
+        said = json.loads((place / "matched.json").read_bytes())["methods"]
+        for file in sorted(place.glob("*/seed_*/config.json")):
+            if entry := said.get(file.parent.parent.name):
+                number = int(file.parent.name.removeprefix("seed_"))
+                own = {"training_seed": 7 * number} if number else {}
+                file.write_bytes(canonical_json({**entry["config"], **own}))
+    pinned = json.loads((root / "artifacts/reload/identity.json").read_bytes())
+    known = {name: entry for name, entry in pinned.items() if name in said}
+    for name, entry in known.items():
+        folders = sorted((place / name).glob("seed_*"))
+        config = said[name]["config"]
+        entry |= {
+            "checkpoints": [checkpoint_sha256(folder) for folder in folders],
+            "config": [_sha256((folder / "config.json").read_bytes()) for folder in folders],
+            "normalisation": _sha256(canonical_json(config["normalisation"])),
+            "sampler": _sha256(canonical_json(config["sampler"])),
+        }
+        entry["checkpoint"] = entry["checkpoints"][0]
+    document(root, "reload/identity.json", pinned)
+    _fixtures_drawn(root, known)
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _fixtures_drawn(root: Path, pinned: dict[str, Any]) -> None:
+    """As training drew them, so that what reload says of them is so."""
+    samples = read_table(root / "artifacts/reload/samples.parquet").to_pandas()
+    counted = read_table(root / "artifacts/reload/nfe.parquet").to_pandas()
+    recorded = counted.set_index(["method", "seed"])["recorded"]
+    rows = [
+        {
+            "method": row["method"], "seed": row["seed"], "row": row["row"],
+            "checkpoint": pinned[row["method"]]["checkpoint"],
+            "sampler": pinned[row["method"]]["sampler"],
+            "nfe": int(recorded[row["method"], row["seed"]]), "prediction_horizon": 16,
+            "sha256": row["sha256_trained"], "samples": [0.0],
+        }
+        for row in samples.to_dict("records") if row["method"] in pinned
+    ]  # fmt: skip
+    table(root, "train_generators/fixtures.parquet", TrainedFixture, rows)
 
 
 def validation(fall: float = 0.04) -> list[dict[str, Any]]:
@@ -999,7 +1092,9 @@ def _baselines(root: Path) -> None:
     ]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
     table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
-    document(root, "train_baselines/matched.json", _matched((*BASELINES, *REMEDIES, DRAWN)))
+    dataset = _sha256((root / "artifacts/ingest/manifest.json").read_bytes())
+    matched = _matched((*BASELINES, *REMEDIES, DRAWN), dataset=dataset)
+    document(root, "train_baselines/matched.json", matched)
     table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
@@ -1056,11 +1151,16 @@ def _factors(root: Path) -> None:
 
 
 def _generators(root: Path) -> None:
+    drawn = _modes(CANDIDATES, 2, nfe=STEPS, convention=SAMPLER)
     for name in ("modes", "modes_earlier"):
-        table(root, f"reload/{name}.parquet", ModeRow, _modes(CANDIDATES, 2, nfe=8))
+        table(root, f"reload/{name}.parquet", ModeRow, drawn)
     manifest = (root / "artifacts/ingest/manifest.json").read_bytes()
     dataset = hashlib.sha256(manifest).hexdigest()
-    document(root, "train_generators/matched.json", _matched(CANDIDATES, dataset=dataset))
+    matched = _matched(("chunked_bc", *CANDIDATES), dataset=dataset)
+    # The reference is the baseline's checkpoint as it lies there.
+    given = json.loads((root / "artifacts/train_baselines/matched.json").read_bytes())
+    matched["methods"]["chunked_bc"] = given["methods"]["chunked_bc"]
+    document(root, "train_generators/matched.json", matched)
     document(root, "candidates/candidates.json", {})
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     table(root, "reload/density.parquet", DensityRow, _densities())
@@ -1201,13 +1301,11 @@ def _reload(root: Path) -> None:
         "reload/identity.json",
         {
             m: {
-                "checkpoint": checkpoint_sha256(m.encode()),
-                "checkpoints": [checkpoint_sha256(m.encode())],
-                "config": [hashlib.sha256(CONFIG).hexdigest()],
+                **dict.fromkeys(("checkpoint", "normalisation", "sampler"), ""),
+                "checkpoints": [],
+                "config": [],
                 "dataset": hashlib.sha256(manifest).hexdigest(),
-                "normalisation": "n",
                 "seed": [0],
-                "sampler": "s",
                 "metadata_mismatches": 0,
                 "nonfinite_weights": 0,
                 "nonfinite_chunks": 0,
@@ -1218,20 +1316,14 @@ def _reload(root: Path) -> None:
     )
 
 
-def checkpoint_sha256(weights: bytes) -> str:
-    """Identity of a checkpoint with these weights and the configuration of all."""
-    parts = [hashlib.sha256(part).hexdigest() for part in (weights, CONFIG)]
-    return hashlib.sha256("".join(f"{part}\n" for part in parts).encode()).hexdigest()
-
-
 def _identity_card(dataset: str) -> dict[str, Any]:
     """Of the configuration that `_matched` writes."""
     return {
-        "architecture": "mlp encoder", "parameters": 100, "training_seeds": ["0"],
+        "architecture": "mlp encoder", "parameters": PARAMETERS, "training_seeds": ["0"],
         "dataset": dataset, "split": split_sha256(SPLIT), "action_semantics": "a" * 64,
         "observation_semantics": "b" * 64, "observation_horizon": 2, "prediction_horizon": 16,
         "execution_horizon": 8, "control_rate_hz": 20.0, "invocation_rate_hz": 2.5,
-        "deadline_s": 0.15, "path": "straight", "sampler": "direct", "sampler_steps": 1,
+        "deadline_s": 0.15, "path": "straight", "sampler": SAMPLER, "sampler_steps": STEPS,
         "eta": None, "tolerance": None, "evaluations": "8", "precision": "float32",
         "device": "cpu", "threads": 1, "cpu_capability": "AVX2", "warm_up": 10, "batch_rows": 16,
         "candidates": 4, "selector": "first_admissible", "selector_owner": "model",
@@ -1258,7 +1350,7 @@ def _latency(root: Path) -> None:
                 "source": "measured" if term in MEASURED_HERE else "declared",
                 "waited_s": 1e-6 if term in MEASURED_HERE else None,
             }
-            for m in CANDIDATES
+            for m in (*CANDIDATES, *COMPARED)
             for run in (1, 2)
             for process in (1, 2, 3)
             for term in TERMS
@@ -1266,27 +1358,7 @@ def _latency(root: Path) -> None:
             for i in range(8)
         ],
     )
-    table(
-        root,
-        "latency/model.parquet",
-        LatencyModelRow,
-        [
-            {
-                "method": m,
-                "run": run,
-                "process": process,
-                "level": level,
-                "measured_s": SPEED[m] * (1 + level / 10 + 0.01 * process),
-                "drawn_s": SPEED[m] * (1.02 + level / 10),
-                "measured_running_s": 0.96 * SPEED[m] * (1 + level / 10 + 0.01 * process),
-                "drawn_running_s": 0.96 * SPEED[m] * (1.02 + level / 10),
-            }
-            for m in (*CANDIDATES, *COMPARED)
-            for run in (1, 2)
-            for process in (1, 2, 3)
-            for level in (0.5, 0.95)
-        ],
-    )
+    model_again(root)
     table(
         root,
         "latency/machine.parquet",
@@ -1309,6 +1381,29 @@ def _latency(root: Path) -> None:
             for process in (1, 2, 3)
         ],
     )
+
+
+def model_again(root: Path) -> None:
+    """The model of the times that lie there, of every process."""
+    times = read_table(root / "artifacts/latency/latency.parquet").to_pandas()
+    known = times["waited_s"].notna() | (times["source"] != "measured")
+    own = times[(times["source"] == "measured") & (times["temperature"] == "warm")]
+    rows: list[dict[str, Any]] = []
+    for method, part in own.groupby("method", sort=False):
+        places = part[["run", "process"]].drop_duplicates().to_dict("records")
+        keys = pd.DataFrame([{**p, "level": level} for p in places for level in (0.5, 0.95)])
+        wall = quantiles_of(part, keys, uniforms(PARAMS["seed"]))
+        found = keys.assign(
+            **dict(zip(("measured_s", "drawn_s"), zip(*wall, strict=True), strict=True))
+        )
+        found = found.assign(measured_running_s=None, drawn_running_s=None, method=method)
+        if known[times["method"] == method].all():
+            alone = part.assign(seconds=part["seconds"] - part["waited_s"])
+            ran = zip(*quantiles_of(alone, keys, uniforms(PARAMS["seed"])), strict=True)
+            names = ("measured_running_s", "drawn_running_s")
+            found = found.assign(**dict(zip(names, ran, strict=True)))
+        rows += found.to_dict("records")
+    table(root, "latency/model.parquet", LatencyModelRow, rows)
 
 
 def _candidates_drawn(root: Path) -> None:

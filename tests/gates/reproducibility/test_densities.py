@@ -58,7 +58,6 @@ def test_gains_are_over_the_mean_of_the_situation(ladder):
         (cells("samples", 0), "more samples than were drawn"),
         (lambda f: f.assign(samples=0, reached=0), "more samples than were drawn"),
         (cells("reached", -1), "corrupt"),
-        (cells("log_density", float("nan")), "non-finite"),
         (lambda f: f[f["mode"] == 0], "each once"),
         (lambda f: f.assign(mode=0), "each once"),
         (lambda f: f.head(0), "no rows"),
@@ -68,6 +67,15 @@ def test_what_cannot_be_is_no_evidence(ladder, change, text):
     evidence.edit_table(ladder, DENSITY, change)
     with pytest.raises(MissingEvidenceError, match=text):
         told(ladder)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_where_no_density_is_a_number_all_are_counted_as_that(ladder, value):
+    evidence.edit_table(ladder, DENSITY, cells("log_density", value))
+    found = told(ladder)
+    assert math.isnan(found.share) and found.interval == (0.0, 1.0)
+    assert (found.situations, found.tied, found.unknown, found.episodes) == (0, 0, 16, 0)
+    assert densities(Evidence(ladder))["gain"].isna().all()
 
 
 def test_where_every_situation_is_a_tie_nothing_is_known(ladder):

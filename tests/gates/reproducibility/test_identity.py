@@ -65,7 +65,7 @@ def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item
      ("action_semantics", "e" * 64), ("observation_semantics", "e" * 64),
      ("observation_horizon", 3), ("prediction_horizon", 17), ("execution_horizon", 9),
      ("control_rate_hz", 10.0), ("invocation_rate_hz", 20.0), ("split", "e" * 64),
-     ("evaluations", "4"), ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
+     ("evaluations", "4"), ("sampler", "heun"), ("sampler_steps", 2), ("batch_rows", 8)],
 )  # fmt: skip
 def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, value):
     say(ladder, item, value)
@@ -77,22 +77,19 @@ def trained_twice(root):
     """`flow` has a second training, and every table has its rows."""
     folder = root / "artifacts/train_generators/flow/seed_1"
     folder.mkdir()
-    (folder / "model.safetensors").write_bytes(b"again")
-    (folder / "config.json").write_bytes(evidence.CONFIG)
+    (folder / "model.safetensors").write_bytes(evidence.weights("again"))
+    (folder / "config.json").write_bytes(b"{}")
     for table in ("samples", "variations", "compute", "nfe", "modes", "modes_earlier"):
         evidence.edit_table(
             root, f"reload/{table}.parquet",
             lambda f: pd.concat([f, f[f["method"] == "flow"].assign(seed=1)], ignore_index=True),
         )  # fmt: skip
     evidence.edit_document(root, IDENTITY, two)
+    evidence.follow(root)
 
 
 def two(document, seeds=(0, 7), said=("0", "7")):
-    weights = (b"flow", b"again")
-    document["flow"] |= {
-        "seed": list(seeds), "config": document["flow"]["config"][:1] * 2,
-        "checkpoints": [evidence.checkpoint_sha256(each) for each in weights],
-    }  # fmt: skip
+    document["flow"]["seed"] = list(seeds)
     document["flow"]["card"]["training_seeds"] = list(said)
 
 
@@ -104,6 +101,8 @@ def test_several_training_seeds_are_all_on_the_card(ladder):
     assert "training_seeds" in unpinned(ladder).caveat
     evidence.edit_document(ladder, IDENTITY, lambda d: two(d, seeds=(7, 0), said=("7", "0")))
     assert unpinned(ladder).caveat == "seed: [7, 0], trained as 0 first"
+    evidence.edit_document(ladder, IDENTITY, lambda d: two(d, seeds=(0, 8), said=("0", "8")))
+    assert unpinned(ladder).caveat == "seed: 0, 8; its trainings have 0, 7"
 
 
 @pytest.mark.parametrize(
@@ -123,8 +122,9 @@ def test_a_training_of_which_a_table_has_no_rows_is_not_left_out(ladder, tables,
 def test_a_training_that_lies_there_and_is_not_on_the_card_is_named(ladder):
     folder = ladder / "artifacts/train_generators/flow/seed_1"
     folder.mkdir()
-    (folder / "model.safetensors").write_bytes(b"the other one")
-    (folder / "config.json").write_bytes(evidence.CONFIG)
+    first = folder.parent / "seed_0/config.json"
+    (folder / "model.safetensors").write_bytes(evidence.weights("the other one"))
+    (folder / "config.json").write_bytes(first.read_bytes())
     found = unpinned(ladder)
     assert "checkpoint: not the files of its trainings" in found.caveat
     assert "seed: modes are of 0, trained were 0, 1" in found.caveat

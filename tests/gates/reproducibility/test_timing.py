@@ -8,6 +8,7 @@ from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
+from gates.reproducibility import timing
 from gates.reproducibility.latency_budget import MEASURED_HERE, TERMS
 from gates.reproducibility.timing import (
     DECLARED,
@@ -17,8 +18,15 @@ from gates.reproducibility.timing import (
 
 LATENCY = "latency/latency.parquet"
 MODEL = "latency/model.parquet"
+
 UNKNOWN = {"measured_running_s": np.nan, "drawn_running_s": np.nan}
 RATIOS = {"warm": "warm_latency_ratio_upper", "cold": "cold_latency_ratio_upper"}
+
+
+@pytest.fixture(autouse=True)
+def _believed(monkeypatch):
+    """The ratio is asked here; that a model is that of its times, in `test_held`."""
+    monkeypatch.setattr(timing, "require_as_timed", lambda *_, **__: None)
 
 
 @pytest.mark.parametrize("temperature", RATIOS)
@@ -75,10 +83,10 @@ def test_processes_that_scatter_show_nothing_though_their_means_agree(ladder, te
 
 @pytest.mark.parametrize(
     ("keep", "why"),
-    [(lambda f: f["run"] == 1, "two runs"),
-     (lambda f: (f["run"] == 1) | (f["process"] == 1), "two runs"),
-     (lambda f: f["process"] == 1, "1 process of each run tells nothing of another"),
-     (lambda f: (f["process"] > 1) | (f["repeat"] < 4), "processes with unequal counts")],
+    [(lambda f: f["run"] == 1, "in process 1 of run 2"),
+     (lambda f: (f["run"] == 1) | (f["process"] == 1), "in process 2 of run 2"),
+     (lambda f: f["process"] == 1, "in process 2 of run 1"),
+     (lambda f: (f["process"] > 1) | (f["repeat"] < 4), "in process 1 of run 1; planned are 8")],
 )  # fmt: skip
 def test_too_few_processes_are_no_answer(ladder, keep, why):
     declared = "declared"
@@ -232,7 +240,8 @@ def test_cold_and_warm_do_not_stand_for_each_other(ladder):
     report = judge(ladder, "B")
     for name in RATIOS.values():
         found = found_in(report, name)[0]
-        assert found.measured is None and "more cold than warm" in found.caveat
+        assert found.measured is None
+        assert "more cold than warm" in found.caveat or "has 2 warm" in found.caveat
 
 
 @pytest.mark.parametrize("twice", [False, True])
@@ -274,18 +283,19 @@ def test_what_was_not_measured_in_two_runs_is_not_compared(ladder, change):
     evidence.edit_table(ladder, LATENCY, change)
     for name in RATIOS.values():
         found = found_in(judge(ladder, "B"), name)[0]
-        assert found.measured is None and ("two runs" in found.caveat or "lacks" in found.caveat)
+        assert found.measured is None
+        assert any(why in found.caveat for why in ("two runs", "lacks", "of run"))
 
 
-def test_two_processes_of_each_run_are_the_fewest_that_answer(ladder):
-    def two(frame):
-        return frame[(frame["process"] < 3) | (frame.get("source", "") == "declared")]
-
-    evidence.edit_table(ladder, MODEL, two)
-    evidence.edit_table(ladder, LATENCY, two)
-    assert asked(ladder, latency_model_ratio_upper, "flow", gate="B").value is not None
+def test_three_processes_of_each_run_are_planned_and_fewer_do_not_answer(ladder):
     found = [found_in(judge(ladder, "B"), name)[0] for name in RATIOS.values()]
-    assert all("over 2 processes each" in one.caveat for one in found)
+    assert all("over 3 processes each" in one.caveat for one in found)
+    two = lambda f: f[(f["process"] < 3) | (f["source"] == "declared")]  # noqa: E731
+    evidence.edit_table(ladder, LATENCY, two)
+    with pytest.raises(MissingEvidenceError, match="of flow in process 3 of run 1"):
+        asked(ladder, latency_model_ratio_upper, "flow", gate="B")
+    found = [found_in(judge(ladder, "B"), name)[0] for name in RATIOS.values()]
+    assert all("in process 3 of run 1" in one.caveat for one in found)
 
 
 @pytest.mark.parametrize("column", ["measured_s", "drawn_s"])
