@@ -47,6 +47,8 @@ def _read(data: bytes, path: str) -> Weights:
     count, nonfinite, precisions = 0, 0, set()
     try:
         length = int.from_bytes(data[:8], "little")
+        if not 8 + length <= len(data):
+            raise ValueError("a header that ends behind the file")
         header, body = json.loads(data[8 : 8 + length]), memoryview(data)[8 + length :]
         for name, tensor in header.items():
             if name == METADATA:

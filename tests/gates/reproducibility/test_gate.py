@@ -15,6 +15,7 @@ from gates.reproducibility.gate import (
     samples_difference,
     unpinned_items,
 )
+from genpolicy.policies.settings import SamplerConfig
 
 MODES = "reload/modes.parquet"
 EARLIER = "reload/modes_earlier.parquet"
@@ -49,9 +50,23 @@ def test_an_adaptive_solver_is_held_against_the_counts_that_it_may_take(
         ladder, "reload/nfe.parquet",
         lambda f: f.assign(recorded=counted, counted=counted, expected=nearest, least=4, most=61),
     )  # fmt: skip
+    chosen = {"name": "bosh3", "steps": 1, "nfe_cap": 63}
+
+    def adaptive(document):
+        for name in evidence.CANDIDATES:
+            document["methods"][name]["config"]["sampler"].update(chosen)
+            document["differing_keys"][name] += [f"sampler.{key}" for key in chosen]
+
+    allowed = [[f"sampler.{key}", "test"] for key in chosen]
+    evidence.write_params(ladder, lambda p: p["comparison"]["may_differ"].extend(allowed))
+    evidence.edit_document(ladder, "train_generators/matched.json", adaptive)
+    said = {
+        "evaluations": "4 to 61", "sampler": "bosh3", "sampler_steps": 1,
+        "tolerance": SamplerConfig(name="bosh3").tolerance,
+    }  # fmt: skip
     evidence.edit_document(
         ladder, "reload/identity.json",
-        lambda d: [one["card"].update(evaluations="4 to 61") for one in d.values()] and None,
+        lambda d: [one["card"].update(said) for one in d.values()] and None,
     )  # fmt: skip
     for table in (MODES, EARLIER):
         evidence.edit_table(ladder, table, lambda f: f.assign(nfe=4 + 3 * (f["index"] % 20)))

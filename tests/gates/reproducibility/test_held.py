@@ -157,8 +157,9 @@ MODELLED = [
      "flow: what model.parquet says was measured is not what the times"),
     (MODEL, lambda f: f.assign(drawn_s=f["measured_s"], **UNKNOWN), "latency_model_ratio_upper",
      "flow: what model.parquet says was drawn is not what the times"),
-    (MODEL, lambda f: f.assign(drawn_s=f["drawn_s"].mask(f["method"] == "act", f["measured_s"]),
-                               **UNKNOWN),
+    (MODEL, lambda f: f.assign(**{
+        name: f[name].mask(f["method"] == "act", value)
+        for name, value in {"drawn_s": f["measured_s"], **UNKNOWN}.items()}),
      "latency_model_ratio_upper", "act: what model.parquet says was drawn"),
     (MODEL, lambda f: f.assign(measured_running_s=1e-3 * f["measured_s"]),
      "latency_model_ratio_upper", "give without the time waited"),

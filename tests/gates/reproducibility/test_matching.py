@@ -125,17 +125,32 @@ def test_a_setting_that_differs_and_is_not_listed_counts_by_name(ladder, part, k
     assert found.value >= 1 and f"{part}.{key}" in found.caveat
 
 
-def test_what_is_listed_by_definition_or_a_count_is_no_setting_that_differs(ladder):
+def test_what_is_so_by_definition_or_a_count_is_no_setting_that_differs(ladder):
     def change(document, own):
         own["parameters"]["head"] = 11
-        own["provenance"]["episodes_sha256"] = "e" * 64
         own["horizons"]["prediction_horizon"] = 1
-        document["one_mode_keys"] = ["provenance.episodes_sha256"]
         document["single_action_keys"] = ["horizons.prediction_horizon"]
 
     assert _configured(ladder, change).value == 0
 
 
+@pytest.mark.parametrize("listed", ["one_mode_keys", "single_action_keys"])
+@pytest.mark.parametrize(
+    ("part", "key", "value"),
+    [("training", "learning_rate", 9.0), ("provenance", "episodes_sha256", "e" * 64)],
+)
+def test_a_list_of_what_is_so_by_definition_hides_nothing_else(ladder, listed, part, key, value):
+    """No candidate learns one mode by definition, and what one action implies is known here."""
+
+    def change(document, own):
+        own[part][key] = value
+        own["horizons"]["prediction_horizon"] = 1
+        document[listed] = [f"{part}.{key}"]
+
+    found = _configured(ladder, change)
+    assert found.value == 1 and f"{part}.{key}" in found.caveat
+
+
 def test_without_the_reference_nothing_is_matched(ladder):
-    with pytest.raises(MissingEvidenceError, match="has no entry of diffusion"):
-        _configured(ladder, lambda d, own: d["methods"].pop("diffusion") and None)
+    with pytest.raises(MissingEvidenceError, match="has no entry of chunked_bc"):
+        _configured(ladder, lambda d, own: d["methods"].pop("chunked_bc") and None)
