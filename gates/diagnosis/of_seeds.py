@@ -4,7 +4,6 @@ import pandas as pd
 
 from gates.diagnosis.looking import Interval, Look, share_of
 from gates.evidence import flags, numbers
-from gates.reproducibility.modes import situations_of
 from gates.reproducibility.settings import MODES
 from gates.stress.rollouts import ROLLOUTS, rollouts
 from gates.words import percents, share_between
@@ -78,8 +77,7 @@ def _success_by_training(look: Look) -> None:
 
 def _coverage_by_training(look: Look) -> None:
     """Only shown: nothing says yet how far trainings may differ in it."""
-    look.rows("B", MODES, ModeRow)
-    for seed, rows in situations_of(look.reports.evidence, look.candidate).groupby("seed"):
+    for seed, rows in look.rows("B", MODES, ModeRow).groupby("seed"):
         reached = int((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).sum())
         look.number(
             f"situations of which training seed {seed} reaches every mode, only shown",
