@@ -129,7 +129,7 @@ def _require_same_windows(evidence: Evidence, methods: Sequence[str]) -> None:
     known: dict[str, int] = {}
     for method in methods:
         for table, measured in losses(evidence, BASELINES, method).items():
-            own = measured["windows"].max(axis="columns").to_dict()
+            own = pd.DataFrame(measured["windows"]).max(axis=1).to_dict()
             if own != (known := known or own):
                 raise MissingEvidenceError(
                     f"{table} has {len(own)} episodes with other held-out windows than "
