@@ -12,6 +12,7 @@ must not be one over what they would have learned.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -126,7 +127,7 @@ def _require_same_windows(evidence: Evidence, methods: Sequence[str]) -> None:
     Raises:
         MissingEvidenceError: One was measured on others.
     """
-    known: dict[str, int] = {}
+    known: dict[Any, Any] = {}
     for method in methods:
         for table, measured in losses(evidence, BASELINES, method).items():
             own = pd.DataFrame(measured["windows"]).max(axis=1).to_dict()
