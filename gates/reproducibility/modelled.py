@@ -19,7 +19,6 @@ DRAWN = 1000
 """Invocations that are drawn of each model (`genpolicy.evidence.reproducibility.latency`)."""
 CLOSE = 1e-9
 """Relative; terms are summed in another order here."""
-PROCESS = ["run", "process"]
 
 
 def require_as_timed(

@@ -69,7 +69,7 @@ def root(tmp_path_factory, _ladder):
 def folders(root, of):
     """Folders of the evidence that hold a file of this name and form."""
     found = []
-    for path in sorted((root / "artifacts").glob(f"*/{of.file}")):
+    for path in sorted((root / "artifacts").rglob(of.file)):
         folder = path.parents[of.file.count("/")]
         try:
             of.read(folder)

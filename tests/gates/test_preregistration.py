@@ -141,7 +141,7 @@ def test_how_much_is_looked_at_is_planned(section, name, value):
 
 def test_the_training_is_planned():
     def more(params):
-        params["policy"] = {"training": {"updates": 9}}
+        params["policy"]["training"] = {"updates": 9}
 
     assert _moved(more) == [("policy.training.updates", "changed")]
 

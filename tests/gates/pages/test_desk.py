@@ -85,7 +85,7 @@ def test_a_stopped_ladder_says_where_by_what_and_never_asks(ladder):
     write_gate(ladder, "A")
     asked = desk(ladder).asked
     assert asked.title.startswith("Nothing is asked of you yet: the ladder stops at gate A")
-    assert "Measured 4 action steps; required at most 1 action steps." in asked.text
+    assert "Measured 4 action steps; required at most 1 action step." in asked.text
     text = (ladder / "reports/index.html").read_text()
     assert asked.title in text and "Asked of you" not in text
 
