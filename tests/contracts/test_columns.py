@@ -61,6 +61,13 @@ MADE = {
     ("gates/pages/tables_survival.py", "broken"): "a place of the table: no frame, sums by place",
     ("gates/pages/tables_survival.py", "held"): "the same",
     ("gates/pages/tables_survival.py", "way"): "the same",
+    ("gates/pages/plots_convergence.py", "color"): "a keyword of matplotlib's lines",
+    ("gates/pages/tables_severity.py", "color"): "the same",
+    ("gates/reproducibility/files.py", "name"): "a setting of the sampler",
+    ("gates/reproducibility/fixtures.py", "checkpoint"): "a key of `identity.json`",
+    ("gates/reproducibility/weights.py", "data_offsets"): "a key in the header of safetensors",
+    ("gates/reproducibility/weights.py", "dtype"): "the same",
+    ("gates/reproducibility/weights.py", "shape"): "the same",
 }
 # Methods of a frame that take names of columns, and functions that take one after the frame.
 METHODS = {"groupby", "sort_values", "drop_duplicates", "set_index", "pivot", "dropna"}
