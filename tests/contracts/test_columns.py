@@ -64,7 +64,7 @@ MADE = {
     ("gates/pages/plots_convergence.py", "color"): "a keyword of matplotlib's lines",
     ("gates/pages/tables_severity.py", "color"): "the same",
     ("gates/reproducibility/files.py", "name"): "a setting of the sampler",
-    ("gates/reproducibility/fixtures.py", "checkpoint"): "a key of `identity.json`",
+    ("gates/reproducibility/fixtures.py", "checkpoint"): "a column of what training drew",
     ("gates/reproducibility/weights.py", "data_offsets"): "a key in the header of safetensors",
     ("gates/reproducibility/weights.py", "dtype"): "the same",
     ("gates/reproducibility/weights.py", "shape"): "the same",
