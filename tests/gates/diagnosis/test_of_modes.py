@@ -31,7 +31,7 @@ def test_rollouts_of_no_mode_are_counted_with_their_success(planted):
         root, "stress/rollouts.parquet", change), ""), FLOW)  # fmt: skip
     modes_of_condition(look)
     said = value(look, "undisturbed rollouts that belong to no mode")
-    assert said.startswith("20 of 80; success 0.")
+    assert said.startswith("20 of 80; success 70 % (")
 
 
 def test_where_each_rollout_has_a_mode_none_is_left(honest):
@@ -82,7 +82,7 @@ def test_the_interval_of_a_move_goes_from_its_lower_to_its_upper_end(planted):
         root, "shadow/candidates.parquet", change), ""), FLOW)  # fmt: skip
     feasible_conditioning(look)
     said = value(look, "p95 of the move by projection in mode left")
-    point, lower, upper = (float(text) for text in re.findall(r"[\d.]+(?= mm)", said))
+    point, lower, upper = (float(text) for text in re.findall(r"[\d.]+(?= (?:mm|to))", said))
     assert lower < upper and lower <= point <= upper
 
 

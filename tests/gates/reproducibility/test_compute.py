@@ -80,7 +80,10 @@ def test_parts_that_are_not_the_whole_are_not_pinned(ladder):
     evidence.edit_document(ladder, "train_generators/matched.json", smaller)
     edit(ladder, "trunk", "parameters", 10)
     found = asked(ladder, unpinned_items, "flow", gate="B")
-    assert found.caveat.startswith("parameters of all parts: counted 30, trained as 100, ")
+    assert found.caveat == (
+        "parameters of all parts: counted 30, trained as 100, "
+        "parameters: matched.json counts others than its configuration"
+    )
 
 
 def test_a_training_without_an_operation_was_not_counted(ladder):

@@ -48,9 +48,15 @@ def test_a_mode_counts_from_its_share_of_admissible_samples_on(ladder, fewest, p
 
 def test_situations_of_one_episode_are_one_draw_of_the_coverage(ladder):
     """One situation a phase: thirty of ten episodes bound the share as ten draws do."""
+
+    def shared(frame):
+        return frame.assign(episode_uuid=[f"e{i % 10}" for i in frame["index"]])
+
     evidence.edit_table(
-        ladder, MODES, lambda f: f.assign(episode_uuid=[f"e{i % 10}" for i in f["index"]])
-    )
+        ladder, "audit/neighbourhoods.parquet",
+        lambda f: shared(f).assign(phase=[f"phase {i // 10}" for i in f["index"]]),
+    )  # fmt: skip
+    evidence.edit_table(ladder, MODES, shared)
     found = found_in(judge(ladder, "B"), "mode_coverage_lower")[0]
     lower, upper = clopper_pearson(10, 10, 0.95)
     assert found.interval == pytest.approx((lower, upper))
@@ -84,7 +90,7 @@ def test_the_seed_of_the_lowest_bound_is_told_with_its_own_numbers(ladder):
     """The second covers less, although its single samples reach more."""
 
     def second(frame):
-        few = frame["index"] % 3 == 0
+        few = frame["index"].isin(evidence.NAMED[::3])
         other = frame.assign(seed=1, fewest_admissible=frame["fewest_admissible"].mask(few, 1))
         first = frame.assign(modes_covered=1)
         return evidence.pd.concat([first, other], ignore_index=True)
