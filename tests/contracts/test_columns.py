@@ -65,9 +65,8 @@ MADE = {
     ("gates/pages/tables_severity.py", "color"): "the same",
     ("gates/reproducibility/files.py", "name"): "a setting of the sampler",
     ("gates/reproducibility/fixtures.py", "checkpoint"): "a column of what training drew",
-    ("gates/reproducibility/weights.py", "data_offsets"): "a key in the header of safetensors",
+    ("gates/reproducibility/weights.py", "data"): "a key of a tensor, as safetensors says it",
     ("gates/reproducibility/weights.py", "dtype"): "the same",
-    ("gates/reproducibility/weights.py", "shape"): "the same",
 }
 # Methods of a frame that take names of columns, and functions that take one after the frame.
 METHODS = {"groupby", "sort_values", "drop_duplicates", "set_index", "pivot", "dropna"}

@@ -4,6 +4,7 @@ Each case is a table or document that nothing else contradicts but what it claim
 """
 
 import json
+from dataclasses import fields
 
 import evidence
 import numpy as np
@@ -14,8 +15,15 @@ from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.proof import SPECS
+from gates.reproducibility import modelled, planned
+from gates.reproducibility.fixtures import TrainedFixture
+from gates.reproducibility.identity import WARM_UP
 from gates.reproducibility.modelled import uniforms
+from genpolicy.evidence import fixtures_again
+from genpolicy.evidence.reproducibility import latency
+from genpolicy.evidence.reproducibility.benchmark import DISCARDED
 from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.policies.fixtures import FixtureRow
 
 CRITERIA = {item.id: item for item in SPECS["B"].criteria}
 IDENTITY, MATCHED = "reload/identity.json", "train_generators/matched.json"
@@ -238,3 +246,13 @@ def test_a_method_that_always_draws_the_same_draws_one_candidate(repo):
 def test_numbers_behind_the_drawn_invocations_hang_on_the_seed_alone():
     assert np.array_equal(uniforms(1)["sample"], uniforms(1)["sample"])
     assert not np.array_equal(uniforms(1)["sample"], uniforms(2)["sample"])
+
+
+def test_what_gates_know_by_other_words_is_what_was_measured_by():
+    """Gates import no network; so these stand twice, and here both sides meet."""
+    assert (planned.RUNS, planned.PROCESSES) == (latency.RUNS, latency.PROCESSES)
+    assert planned.SHOWN_TO_BROUGHT == fixtures_again.FIXTURES
+    assert modelled.DRAWN == latency.DRAWN
+    assert WARM_UP == DISCARDED
+    own, theirs = ([(f.name, f.type) for f in fields(of)] for of in (TrainedFixture, FixtureRow))
+    assert own == theirs
