@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import torch
@@ -92,7 +93,7 @@ class Contenders:
         names = [(policy.checkpoint_hash, "a", row, 0) for row in range(candidates)]
         noise = np.stack([counter_noise(name, shape=shape) for name in names])
         self.noise = torch.from_numpy(noise.astype(np.float32))
-        self.scheduler = DDIMScheduler(
+        self.scheduler: Any = DDIMScheduler(
             num_train_timesteps=self.levels, beta_schedule="squaredcos_cap_v2", clip_sample=True,
             timestep_spacing="trailing", set_alpha_to_one=True,
         )  # fmt: skip

@@ -111,7 +111,7 @@ def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequ
             drawn, wrong = drawn_chunks(path)
         if wrong:
             refuse("D", path.name, wrong, "every invocation with what it saw and its own noise")
-        for item in _some(drawn, OF_A_JOURNAL, path):
+        for item in _of_either(drawn, path):
             asked[item.method].append(_asked(task, path, item))
     _draw_again("D", root, params, asked, samples=stress.samples, joining=stress.joining)
 
@@ -139,6 +139,18 @@ def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
         rows = [row for moment in chosen for row in of_method[moment]]
         asked[method] = [_of_row(data, horizons, row) for row in rows]
     _draw_again("C", root, params, asked, samples=shadow.samples, joining=REPLACING, always=True)
+
+
+def _of_either(drawn: Sequence[Drawn], path: Path) -> list[Drawn]:
+    """Some of a journal, half of them with numbers where there are so many.
+
+    Only numbers tell what another processor rounds from what another checkpoint drew.
+    """
+    kinds = [[one for one in drawn if (one.actions is None) is hidden] for hidden in (False, True)]
+    numbered, hashed = kinds
+    count = max(OF_A_JOURNAL - len(hashed), OF_A_JOURNAL // 2)
+    chosen = list(_some(numbered, count, path))
+    return [*chosen, *_some(hashed, OF_A_JOURNAL - len(chosen), path)]
 
 
 def _some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:

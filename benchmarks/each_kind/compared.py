@@ -9,7 +9,8 @@ import yaml
 from numpy.typing import NDArray
 
 from benchmarks.ladder_truth.bringing import FLOW
-from gates.report import Answer, GateReport, limit_text, measured_text, read_report, report_path
+from gates.readable import limit_text, measured_text
+from gates.report import Answer, GateReport, read_report, report_path
 from genpolicy.candidates.brought import read_brought
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.chunk import actions_sha256

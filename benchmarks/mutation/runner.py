@@ -128,7 +128,7 @@ def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: 
         if path.startswith(KERNELS):  # what was compiled of the true text must not be found
             import numba
 
-            numba.config.CACHE_DIR = str(scratch / "kernels")
+            numba.config.CACHE_DIR = str(scratch / "kernels")  # type: ignore[attr-defined]
         import pytest
 
         options = ["-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--timeout=0"]

@@ -73,6 +73,19 @@ def test_rollouts_of_another_checkpoint_under_this_name_are_refused(root, params
         rederive_rollout_draws(root, params, journals[1:])
 
 
+@pytest.mark.parametrize(("numbered", "hashed", "asked"), [(3, 100, 3), (100, 2, 10), (50, 50, 6)])
+def test_of_a_journal_what_has_numbers_is_asked_where_there_is_some(
+    journals, numbered, hashed, asked
+):
+    """Hashes alone do not tell another checkpoint from another machine's rounding."""
+    drawn, _ = module.drawn_chunks(journals[0])
+    one = next(item for item in drawn if item.actions is not None)
+    many = [one] * numbered + [replace(one, actions=None)] * hashed
+    chosen = module._of_either(many, journals[0])
+    assert len(chosen) == module.OF_A_JOURNAL
+    assert sum(item.actions is not None for item in chosen) == asked
+
+
 def test_a_policy_that_nobody_trained_drew_nothing(root, params, journals):
     shutil.rmtree(folder_of(root))
     with pytest.raises(RefusedError, match="drawn by flow"):

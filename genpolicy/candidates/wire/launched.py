@@ -1,5 +1,6 @@
 """A server of somebody's policy: its files verified, started on a free port, watched, ended."""
 
+import errno
 import os
 import secrets
 import shutil
@@ -24,6 +25,8 @@ LAST_WORDS = 300
 END_ROUNDS = 20
 PORTS = 3
 """Free ports that are tried: between the choice of one and the server, somebody may take it."""
+IN_USE = os.strerror(errno.EADDRINUSE).lower()
+"""What a server says last that could not listen."""
 MARK = "GENPOLICY_LAUNCH"
 """In the environment of a server, so that what it starts is found whatever session it is in."""
 NOTHING: Mapping[str, str] = MappingProxyType({})
@@ -153,9 +156,10 @@ class Launched(AbstractContextManager["Launched"]):
             raise
 
     def _await(self, entry: ServerEntry, port: int, until: float) -> None:
+        answered = False
         while True:
             if ended := self.died():
-                if _taken(port):
+                if _taken(port, ended):
                     raise PortTakenError
                 raise PolicyError(Fault.CLOSED, ended)
             left = until - time.monotonic()
@@ -165,9 +169,15 @@ class Launched(AbstractContextManager["Launched"]):
                 if fault.fault is not Fault.CLOSED:
                     raise
             else:
-                if listens(port, marked(MARK, self._mark)) is not False:
+                known = listens(port, marked(MARK, self._mark))
+                if known is False:
+                    raise PortTakenError
+                # Who listened and is not there now was somebody on the way through (`free_port`
+                # of another process holds a port for a moment); where nothing is ever known of
+                # sockets, whoever answers twice is taken for ours.
+                if known or answered:
                     return
-                raise PortTakenError
+                answered = True
             if left <= 0.0:
                 raise PolicyError(
                     Fault.LATE, f"it does not listen after {entry.start_timeout_s:g} s"
@@ -178,9 +188,9 @@ class Launched(AbstractContextManager["Launched"]):
         self.end()
 
 
-def _taken(port: int) -> bool:
-    """Whether somebody listens there, after a server of ours has ended."""
-    return listens(port, []) is not None
+def _taken(port: int, ended: str) -> bool:
+    """Whether somebody listens there after a server of ours has ended, or did when it began."""
+    return listens(port, []) is not None or IN_USE in ended.lower()
 
 
 def _begin(

@@ -86,8 +86,10 @@ class RemotePolicy:
         self._line: Connection | None = None
         try:
             self.told: Capabilities = capabilities(self._connected().metadata)
-        except PolicyError:
+        except PolicyError as error:
             self.close()
+            if gone := ended():
+                raise PolicyError(Fault.CLOSED, gone) from error
             raise
         if self.told.prediction_horizon not in (None, entry.horizons.prediction_horizon):
             self.close()

@@ -144,6 +144,51 @@ def test_a_port_that_somebody_else_took_is_not_asked(entry, tmp_path, monkeypatc
             Launched(entry, tmp_path)
 
 
+def test_who_passes_through_a_port_is_no_server_of_ours(entry, tmp_path, monkeypatch, serving):
+    """Another process tries the port for a moment: it answers, and is gone before ours listens."""
+    with serving(lambda message: message, {}) as address:
+        port = int(address.rpartition(":")[2])
+    monkeypatch.setattr(launched, "free_port", lambda: port)
+    asked = []
+
+    def passing(address, **known):
+        asked.append(address)
+        if len(asked) > 1:
+            return dial(address, **known)
+        with serving(lambda message: message, {}) as stranger:
+            return dial(stranger, **known)
+
+    monkeypatch.setattr(launched, "dial", passing)
+    # Long after the stranger, so that the moment is there.
+    (tmp_path / "server.py").write_text("import time; time.sleep(1)\n" + SERVER)
+    with Launched(entry, tmp_path) as running:
+        assert metadata(running.address)["pid"] == running._process.pid
+
+
+def test_a_port_that_was_in_use_for_a_moment_is_another_try(entry, tmp_path, monkeypatch):
+    """The server ends because somebody held the port, who is not there any more."""
+    used = "raise OSError(98, 'error while attempting to bind: address already in use')\n"
+    script = tmp_path / "server.py"
+    ports = [free_port(), free_port()]
+
+    def given():
+        script.write_text(used + SERVER if len(ports) == 2 else SERVER)
+        return ports.pop(0)
+
+    monkeypatch.setattr(launched, "free_port", given)
+    with Launched(entry, tmp_path) as running:
+        assert metadata(running.address)["pid"] == running._process.pid
+    assert not ports
+
+
+def test_a_server_that_dies_before_it_is_first_asked_says_why(entry, tmp_path, task):
+    with Launched(entry, tmp_path) as running:
+        running._process.kill()
+        running._process.wait(60)
+        with pytest.raises(PolicyError, match="it ended with -9"):
+            RemotePolicy(entry, running.address, task.observation, ended=running.died)
+
+
 class HangsUp(socketserver.BaseRequestHandler):
     """Speaks no WebSocket."""
 
