@@ -2,6 +2,7 @@
 
 import base64
 import copy
+import functools
 import hashlib
 import json
 from collections.abc import Callable
@@ -501,7 +502,7 @@ def record(root: Path) -> None:
     if not (root / "dvc.yaml").is_file():
         return
     disk = pipeline.Disk(root, {})
-    params = yaml.safe_load((root / "params.yaml").read_text()) or {}
+    params = _read_again((root / "params.yaml").read_text()) or {}
     stages, runs = {}, {}
     for gate, names in pipeline.RUNGS.items():
         for name in names:
@@ -517,6 +518,12 @@ def record(root: Path) -> None:
         stages[f"gate_{gate.lower()}"] = {"cmd": "gate", "deps": [CODE], "outs": []}
     (root / "dvc.yaml").write_text(json.dumps({"stages": stages}))
     (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}))
+
+
+@functools.lru_cache(maxsize=4)
+def _read_again(text: str) -> Any:
+    """Settings, which few edits of evidence change; do not write into them."""
+    return yaml.safe_load(text)
 
 
 def _dataset(root: Path) -> None:
