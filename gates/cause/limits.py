@@ -95,7 +95,7 @@ def limits_of(
 def default_limits() -> CauseLimits:
     """The packaged limits, for an audit without a ladder.
 
-    Every question that a criterion asks asks for them, and reading them takes a third of Gate A.
+    Every question that a criterion asks as well asks for them: fifteen times in one judgement.
     """
     text = files("gates.cause").joinpath(DEFAULTS).read_bytes()
     document = dict(parse_yaml(text, where=DEFAULTS))
