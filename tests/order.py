@@ -12,17 +12,24 @@ TESTS = Path(__file__).parent
 LONG = (
     "ladder/test_whole_way.py",
     "wall_clock/test_run.py",
+    "gates/test_criteria.py",
+    "gates/test_commands_of_a_ladder.py",
+    "gates/test_bad_documents.py",
+    "wall_clock/test_proxy.py",
     "execution/test_soak.py",
-    "feasibility/test_dense.py",
     "flows/test_ladder.py",
-    "ladder/test_refusals.py",
+    "audit/test_written.py",
+    "feasibility/test_dense.py",
     "ladder/test_kills.py",
-    "ladder/test_who_failed_stays_out.py",
     "ladder/test_repro.py",
+    "ladder/test_who_failed_stays_out.py",
+    "ladder/test_refusals.py",
+    "ladder/test_bundle.py",
     "ladder/test_truth.py",
     "ladder/test_settings.py",
 )
-"""Files of half a minute and more; behind those that need no ladder, the longest first."""
+"""Files of more than a minute, and those of the ladder; those that need none go on while it is
+built, and are longer than that takes."""
 
 
 class Item(Protocol):

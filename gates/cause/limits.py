@@ -5,6 +5,7 @@ written once in `params.yaml`. Where there is no ladder, the packaged defaults h
 their numbers equal to `params.yaml`, and their reasons speak of no task.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -90,8 +91,12 @@ def limits_of(
     return _whole(found, confidence, where)
 
 
+@functools.cache
 def default_limits() -> CauseLimits:
-    """The packaged limits, for an audit without a ladder."""
+    """The packaged limits, for an audit without a ladder.
+
+    Every question that a criterion asks as well asks for them: fifteen times in one judgement.
+    """
     text = files("gates.cause").joinpath(DEFAULTS).read_bytes()
     document = dict(parse_yaml(text, where=DEFAULTS))
     confidence = float(document.pop("confidence"))

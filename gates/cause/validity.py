@@ -1,5 +1,6 @@
 """Does each mode succeed, and is it feasible? And what was found, whatever the outcomes."""
 
+import functools
 from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
@@ -177,7 +178,13 @@ def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) ->
 
 
 def _ends(successes: int, episodes: int, limits: CauseLimits) -> tuple[float, float]:
-    return clopper_pearson(successes, episodes, limits.confidence)
+    return _interval(successes, episodes, limits.confidence)
+
+
+@functools.lru_cache(maxsize=4096)
+def _interval(successes: int, episodes: int, confidence: float) -> tuple[float, float]:
+    """Resampled audits ask for the same counts hundreds of times."""
+    return clopper_pearson(successes, episodes, confidence)
 
 
 def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer:

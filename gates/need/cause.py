@@ -38,11 +38,18 @@ OF_A_MODE = {
 def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
     """The cause that the audit's numbers name under the limits of this gate.
 
+    Four criteria ask for it; all resampled audits are read and named once.
+
     Raises:
         MissingEvidenceError: Numbers, or limits of shared questions, are missing.
         ConfigError: A limit lies below what the audit looked for, or a question has none.
     """
     limits = _limits(settings)
+    key = ("cause", limits.confidence, *limits.by_question.items())
+    return evidence.once(key, lambda: _named(evidence, limits))
+
+
+def _named(evidence: Evidence, limits: CauseLimits) -> Cause:
     try:
         numbers, draws = read_numbers(*_readers(evidence))
     except BadInputError as error:

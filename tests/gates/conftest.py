@@ -15,6 +15,7 @@ from gates.card.card import card_bytes
 from gates.card.drafting import draft
 from gates.proof import judge
 from gates.report import GATES, read_report, report_bytes, report_path
+from gates.writing import write_gate
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.statistics import clustered
 
@@ -63,6 +64,16 @@ def _ladder(tmp_path_factory: pytest.TempPathFactory, _evidence: Path) -> Path:
     judge_all(root)
     write_draft(root)
     (root / "reviewers.yaml").write_text("people: []\n")
+    return root
+
+
+@pytest.fixture(scope="session")
+def _written(tmp_path_factory: pytest.TempPathFactory, _ladder: Path) -> Path:
+    """That ladder with the pages of every gate and the first page; nobody writes into it."""
+    root = tmp_path_factory.mktemp("written") / "repo"
+    shutil.copytree(_ladder, root)
+    for gate in GATES:
+        write_gate(root, gate)
     return root
 
 

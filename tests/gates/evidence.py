@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import copy
+import functools
 import hashlib
 import json
 from collections.abc import Callable, Sequence
@@ -523,7 +524,7 @@ def record(root: Path) -> None:
     if not (root / "dvc.yaml").is_file():
         return
     disk = pipeline.Disk(root, {})
-    params = yaml.safe_load((root / "params.yaml").read_text()) or {}
+    params = _read_again((root / "params.yaml").read_text()) or {}
     stages, runs = {}, {}
     for gate, names in pipeline.RUNGS.items():
         for name in names:
@@ -539,6 +540,12 @@ def record(root: Path) -> None:
         stages[f"gate_{gate.lower()}"] = {"cmd": "gate", "deps": [CODE], "outs": []}
     (root / "dvc.yaml").write_text(json.dumps({"stages": stages}))
     (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}))
+
+
+@functools.lru_cache(maxsize=4)
+def _read_again(text: str) -> Any:
+    """Settings, which few edits of evidence change; do not write into them."""
+    return yaml.safe_load(text)
 
 
 def _dataset(root: Path) -> None:

@@ -25,12 +25,8 @@ CELL = re.compile(r'<td id="([^"]*)".*?</td>', re.DOTALL)
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory, _ladder):
-    root = tmp_path_factory.mktemp("pages") / "repo"
-    shutil.copytree(_ladder, root)
-    for gate in "ABCDE":
-        write_gate(root, gate)
-    return root
+def pages(_written):
+    return _written
 
 
 def _page(root, gate):

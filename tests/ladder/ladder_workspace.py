@@ -1,6 +1,9 @@
 """A small ladder in a workspace of its own, copies of it, and what changed between two looks."""
 
+import contextlib
 import hashlib
+import importlib
+import io
 import os
 import shutil
 import subprocess
@@ -8,13 +11,16 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
+import pytest
 import yaml
 
 from flows.reproduce import RunEnd, reproduce, stage_environment
 from flows.workspace import make_workspace
 from gates.proof import SPECS
 from genpolicy.compiled import cache_folder
+from stages._stage import main
 
 ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
@@ -137,8 +143,28 @@ def run_stage(workspace: Path, name: str) -> tuple[int, str]:
         text=True,
         check=False,
     )
-    said = [line for line in done.stderr.splitlines() if line.startswith(f"{name}: ")]
-    return done.returncode, said[-1] if said else done.stderr
+    return done.returncode, last_words(name, done.stderr)
+
+
+def run_here(workspace: Path, name: str) -> tuple[int, str]:
+    """The same in this process: the checkout's code is the workspace's, and is imported once."""
+    said = io.StringIO()
+    work = importlib.import_module(f"stages.{name}").work
+    with (
+        mock.patch.dict(os.environ),
+        contextlib.chdir(workspace),
+        contextlib.redirect_stderr(said),
+        pytest.raises(SystemExit) as end,
+    ):
+        main(name, work)
+    assert isinstance(end.value.code, int)
+    return end.value.code, last_words(name, said.getvalue())
+
+
+def last_words(stage: str, said: str) -> str:
+    """The last line that a stage said in its own name, or all that was said."""
+    lines = [line for line in said.splitlines() if line.startswith(f"{stage}: ")]
+    return lines[-1] if lines else said
 
 
 def hashes(workspace: Path, *folders: str, leave: Iterable[str] = ()) -> dict[str, str]:

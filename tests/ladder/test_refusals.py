@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ladder_workspace import edit_params, flip_a_bit, hashes, repro, run_stage, set_limit
+from ladder_workspace import (
+    edit_params,
+    flip_a_bit,
+    hashes,
+    repro,
+    run_here,
+    run_stage,
+    set_limit,
+)
 
 from gates.report import SCHEMA_VERSION, read_report, report_bytes
 from genpolicy.integrity.tables import read_table, write_table
@@ -44,7 +52,7 @@ def flip(pattern: str) -> Tamper:
 def forge_a_pass(workspace: Path) -> None:
     """Gate A fails honestly, then somebody writes PASS into its report."""
     set_limit(workspace, "gate_a", "persistence_margin", 1e9)
-    assert run_stage(workspace, "gate_a")[0] == 0
+    assert run_here(workspace, "gate_a")[0] == 0
     report, _ = read_report(workspace, "A")
     assert report.verdict == "FAIL"
     edit_report("gate_a", lambda document: document.update(verdict="PASS"))(workspace)
@@ -147,12 +155,16 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
 }  # fmt: skip
 
 
+APART = "evidence of another candidate"
+"""The case whose stage runs in a process of its own; of the others it would say no more."""
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_not_true_stops_the_next_stage(copy: Path, name: str) -> None:
     tamper, stage, code, sentence = CASES[name]
     tamper(copy)
     before = hashes(copy, "artifacts", "reports")
-    found, said = run_stage(copy, stage)
+    found, said = (run_stage if name == APART else run_here)(copy, stage)
     assert (found, said[: len(stage) + 2]) == (code, f"{stage}: "), said
     assert re.search(sentence, said), said
     assert "\n" not in said
@@ -211,23 +223,38 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     assert report["diagnosis"].startswith("First unmet: persistence_margin")
 
 
+def unlimited(workspace: Path, gate: str) -> None:
+    edit_params(workspace, lambda params: params[gate]["limits"].clear())
+
+
+NO_LIMIT = "required a limit in params.yaml"
+
+
 @pytest.mark.parametrize(
     ("gate", "stage"),
-    [
-        ("gate_a", "train_generators"),
-        ("gate_b", "shadow"),
-        ("gate_c", "stress"),
-        ("gate_d", "failure_search"),
-    ],
+    [("gate_a", "train_generators"), ("gate_c", "stress"), ("gate_d", "failure_search")],
 )
 def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str) -> None:
-    edit_params(copy, lambda params: params[gate]["limits"].clear())
-    outcome, ran = repro(copy, stage)
-    assert (outcome.code, outcome.stage) == (3, stage)
-    assert ran == [gate, stage]
-    assert "required a limit in params.yaml" in outcome.sentence, outcome.sentence
-    assert not (copy / "artifacts" / stage).exists()
+    unlimited(copy, gate)
+    outcome, ran = repro(copy, gate, single_item=True)
+    assert (outcome.code, ran) == (0, [gate])
     report = json.loads((copy / "reports" / f"{gate}.json").read_text())
+    assert report["verdict"] == "INCONCLUSIVE"
+    before = hashes(copy, "artifacts", "reports")
+    code, said = run_here(copy, stage)
+    assert (code, said[: len(stage) + 2]) == (3, f"{stage}: "), said
+    assert NO_LIMIT in said, said
+    assert hashes(copy, "artifacts", "reports") == before, "a refused stage wrote something"
+
+
+def test_an_empty_threshold_set_stops_repro(copy: Path) -> None:
+    unlimited(copy, "gate_b")
+    outcome, ran = repro(copy, "shadow")
+    assert (outcome.code, outcome.stage) == (3, "shadow")
+    assert ran == ["gate_b", "shadow"]
+    assert NO_LIMIT in outcome.sentence, outcome.sentence
+    assert not (copy / "artifacts" / "shadow").exists()
+    report = json.loads((copy / "reports" / "gate_b.json").read_text())
     assert report["verdict"] == "INCONCLUSIVE"
 
 

@@ -31,6 +31,12 @@ BEHIND_GATE_A = [
 ]  # fmt: skip
 
 
+def once(monitors: dict[str, Any]) -> None:
+    """Each kind of rollout once; the finished ladder has all families of probes."""
+    monitors["threshold_starts"] = 1
+    monitors["probes"] = {"lighting": monitors["probes"]["lighting"]}
+
+
 def methods(workspace: Path, table: str) -> set[str]:
     return set(pd.read_parquet(workspace / "artifacts" / table)["method"])
 
@@ -41,6 +47,8 @@ def test_ibc_plain_bc_and_a_policy_of_somebody_else_as_candidates(copy: Path) ->
     def add(params: dict[str, Any]) -> None:
         params["train_generators"]["samplers"] = ADDED  # the others' way: the finished ladder
         params["stress"]["starts"] = 1
+        params["card"]["failure_search"]["evaluations"] = 1
+        once(params["monitors"])
 
     edit_params(copy, add)
     outcome, ran = repro(copy)

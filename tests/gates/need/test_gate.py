@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from editing import cells
 
-from gates.cause import default_limits
+from gates.cause import default_limits, name_cause
 from gates.criterion import Criterion
 from gates.more import HARDLY, INSIDE
+from gates.need import cause
 from gates.need.settings import NeedSettings
 from gates.proof import SPECS, judge
 from gates.settings import read_params
@@ -50,6 +51,16 @@ def contaminated(root):
 
 def verdicts(report):
     return {answer.id: answer.verdict for answer in report.criteria}
+
+
+def test_the_cause_is_named_once_for_all_who_ask_and_counts_as_read_by_each(ladder, monkeypatch):
+    named = []
+    monkeypatch.setattr(cause, "name_cause", lambda *given: named.append(1) or name_cause(*given))
+    report = judge(ladder, "A")
+    assert len(named) == 1
+    asking = {answer.id: set(answer.evidence) for answer in report.criteria}
+    draws = "artifacts/audit/resamples.parquet"
+    assert [draws in asking[name] for name in ("cause_accepted", "data_defects")] == [True, True]
 
 
 @pytest.mark.parametrize("name", list(DEFECTS))

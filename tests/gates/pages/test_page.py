@@ -3,7 +3,6 @@
 import html
 import json
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -25,12 +24,8 @@ EVIL = '<script>alert("x")</script>'
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory, _ladder):
-    root = tmp_path_factory.mktemp("pages") / "repo"
-    shutil.copytree(_ladder, root)
-    for gate in "ABCDE":
-        write_gate(root, gate)
-    return root
+def pages(_written):
+    return _written
 
 
 def _page(root, gate):
