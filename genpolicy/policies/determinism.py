@@ -8,6 +8,10 @@ import torch
 
 from genpolicy.errors import ConfigError
 
+# torch puts another object in the place of the module, which its types do not say.
+_PRODUCTS = (torch.backends.cuda.matmul, torch.backends.mkldnn.matmul)  # type: ignore[attr-defined]
+_FEWER_BITS = {"tf32", "bf16"}
+
 
 def require_device(device: str, *, where: str = "params.yaml: compute.device") -> None:
     """Refuse a device that this machine does not have, and say who named it.
@@ -37,7 +41,9 @@ def require_device(device: str, *, where: str = "params.yaml: compute.device") -
 
 @contextlib.contextmanager
 def deterministic(device: str) -> Iterator[None]:
-    """One CPU thread and deterministic kernels inside the block; the old settings after it.
+    """One CPU thread, deterministic kernels and whole float32 products inside the block.
+
+    The old settings come back after it.
 
     Args:
         device: `cpu`, or a CUDA device, whose matrix products then use a fixed workspace.
@@ -56,11 +62,38 @@ def deterministic(device: str) -> Iterator[None]:
         torch.set_deterministic_debug_mode("error")
         if threads != 1:
             torch.set_num_threads(1)
-        yield
+        with _whole_products():
+            yield
     finally:
         torch.set_deterministic_debug_mode(mode)
         if threads != 1:
             torch.set_num_threads(threads)
+
+
+@contextlib.contextmanager
+def _whole_products() -> Iterator[None]:
+    """Products of float32 in float32, whatever whoever shares the process allowed torch to do.
+
+    A program, or the environment of a container, may let a GPU multiply by TF32 and a CPU by
+    bfloat16: other bits, a thousandfold further from the sum, of what a card calls float32.
+    """
+    before = [own.fp32_precision for own in _PRODUCTS]
+    if not _FEWER_BITS & set(before):
+        yield
+        return
+    named = None
+    # Of whoever used torch's newer switch the older one cannot be read, and was not moved.
+    with contextlib.suppress(RuntimeError):
+        named = torch.get_float32_matmul_precision()
+    # The older switch moves both; torch refuses to multiply where they contradict each other.
+    torch.set_float32_matmul_precision("highest")
+    try:
+        yield
+    finally:
+        if named is not None:
+            torch.set_float32_matmul_precision(named)
+        for own, precision in zip(_PRODUCTS, before, strict=True):
+            own.fp32_precision = precision
 
 
 @contextlib.contextmanager
@@ -72,11 +105,15 @@ def initial_weights(seed: int) -> Iterator[None]:
 
 
 def regime(device: str) -> dict[str, str | int]:
-    """What bit equality rests on, for the record."""
+    """What bit equality rests on, for the record; of a CUDA device also which card it is."""
     capability = torch.backends.cpu.get_cpu_capability()
+    card = {}
+    if torch.device(device).type == "cuda":
+        card = {"card": torch.cuda.get_device_name(device), "cuda": str(torch.version.cuda)}
     return {
         "torch": torch.__version__,
         "device": device,
         "cpu_capability": str(capability),
         "threads": 1,
+        **card,
     }

@@ -204,7 +204,7 @@ class NetworkPolicy:
 
     def synchronise(self) -> None:
         """Wait until the device has finished what was asked of it."""
-        if self.device != "cpu":
+        if torch.device(self.device).type == "cuda":
             torch.cuda.synchronize(self.device)
 
     def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:

@@ -16,6 +16,7 @@ import torch
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.density import log_density
+from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
@@ -277,3 +278,49 @@ def test_another_sampler_of_a_loaded_policy_stays_there(folders, two_mode_window
     fresh = load_policy(folders["flow"], sampler=sampler_of("midpoint"), device=DEVICE)
     drawn = [one.sample(seen, noise_names=names(2), candidates=2).actions for one in (other, fresh)]
     assert drawn[0].tobytes() == drawn[1].tobytes()
+
+
+@pytest.fixture
+def whole_products():
+    yield
+    torch.set_float32_matmul_precision("highest")
+    for own in (torch.backends.cuda.matmul, torch.backends.mkldnn.matmul):
+        own.fp32_precision = "none"
+
+
+def loosened(how):
+    """Products by TF32, as programs allow them with torch's older switch, and its newer one."""
+    if how == "older":
+        torch.backends.cuda.matmul.allow_tf32 = True
+    else:
+        torch.backends.cuda.matmul.fp32_precision = "tf32"
+
+
+@pytest.mark.usefixtures("whole_products")
+@pytest.mark.parametrize("how", ["older", "newer"])
+def test_products_are_of_float32_whatever_the_process_allows(
+    folders, how, tmp_path, request_for, two_mode_windows
+):
+    left, right = (torch.randn(256, 256, device=DEVICE) for _ in range(2))
+    whole = left @ right
+    seen = two_mode_windows(8, seed=9).observations
+    policy = load_policy(folders["flow"], device=DEVICE)
+    drawn = policy.sample(seen, noise_names=names(8), candidates=2).actions
+    request = request_for("flow", updates=20)
+    made = train(tmp_path / "one", request, windows=two_mode_windows(), device=DEVICE)
+    loosened(how)
+    if how == "older":  # of the newer one alone torch refuses to multiply outside the regime
+        assert not torch.equal(left @ right, whole), "this card has no TF32, nothing is shown"
+    with deterministic(DEVICE):
+        assert torch.equal(left @ right, whole)
+    found = policy.sample(seen, noise_names=names(8), candidates=2).actions
+    assert found.tobytes() == drawn.tobytes()
+    assert train(tmp_path / "two", request, windows=two_mode_windows(), device=DEVICE) == made
+    assert torch.backends.cuda.matmul.fp32_precision == "tf32"
+
+
+def test_the_record_of_a_training_names_the_card(tmp_path, request_for, two_mode_windows):
+    train(tmp_path / "one", request_for("flow", updates=2), windows=two_mode_windows(),
+          device=DEVICE)  # fmt: skip
+    record = json.loads((tmp_path / "one" / "training.json").read_text())["regime"]
+    assert record["card"] == torch.cuda.get_device_name(DEVICE) and record["cuda"]

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 
 import pytest
 import torch
@@ -13,6 +14,7 @@ from genpolicy.policies.methods import METHODS
 from genpolicy.policies.networks import (
     Dimensions,
 )
+from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig
 
 
@@ -82,6 +84,71 @@ def test_the_regime_is_left_as_it_was_found() -> None:
         assert torch.get_deterministic_debug_mode() == 1
     finally:
         torch.set_deterministic_debug_mode(before)
+
+
+def states() -> list[str]:
+    """Of the older switch, where torch tells it, and of both newer ones."""
+    backends = torch.backends
+    try:
+        named = torch.get_float32_matmul_precision()
+    except RuntimeError:
+        named = "in conflict"
+    return [named, backends.cuda.matmul.fp32_precision, backends.mkldnn.matmul.fp32_precision]
+
+
+def newer(part: str, precision: str) -> Callable[[], None]:
+    own = getattr(torch.backends, part).matmul
+    return lambda: setattr(own, "fp32_precision", precision)
+
+
+@pytest.fixture
+def switches() -> Iterator[None]:
+    """torch's switches for products of fewer bits, as they are in a fresh process."""
+    yield
+    torch.set_float32_matmul_precision("highest")
+    for own in (torch.backends.cuda.matmul, torch.backends.mkldnn.matmul):
+        own.fp32_precision = "none"
+    assert states() == ["highest", "none", "none"]
+
+
+LOOSENED = [
+    lambda: torch.set_float32_matmul_precision("high"),
+    lambda: torch.set_float32_matmul_precision("medium"),
+    newer("cuda", "tf32"),
+    newer("mkldnn", "bf16"),
+]
+
+
+@pytest.mark.usefixtures("switches")
+@pytest.mark.parametrize("loosen", LOOSENED, ids=["high", "medium", "newer tf32", "newer bf16"])
+def test_products_are_of_float32_whatever_the_process_allows(folders, loosen, two_mode_windows):
+    """On processors with bfloat16 products `medium` gave other samples of the same weights."""
+    policy, seen = load_policy(folders["flow"]), two_mode_windows(40).observations
+    names = [("row", row) for row in range(40)]
+    expected = policy.sample(seen, noise_names=names, candidates=2).actions
+    loosen()
+    before = states()
+    assert {"tf32", "bf16"} & set(before)
+    with deterministic("cpu"):
+        assert states() == ["highest", "ieee", "ieee"]
+    assert states() == before
+    found = policy.sample(seen, noise_names=names, candidates=2).actions
+    assert found.tobytes() == expected.tobytes()
+    assert load_policy(folders["flow"]).sample(
+        seen, noise_names=names, candidates=2
+    ).actions.tobytes() == expected.tobytes()  # fmt: skip
+
+
+def test_the_record_names_the_card_of_a_cuda_device_and_of_no_other(monkeypatch) -> None:
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda _: "A100")
+    assert {"torch", "device", "cpu_capability", "threads"} == set(determinism.regime("cpu"))
+    assert determinism.regime("cuda:0")["card"] == "A100"
+    assert "card" not in determinism.regime("cpu:0")
+
+
+def test_another_name_of_the_cpu_has_nothing_to_wait_for(folders) -> None:
+    """torch knows how to wait for CUDA devices only, and a wheel without them raises."""
+    load_policy(folders["flow"], device="cpu:0").synchronise()
 
 
 @pytest.mark.parametrize("method", ["diffusion", "ibc"])
