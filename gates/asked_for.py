@@ -90,6 +90,7 @@ CHECKS_ASKED_FOR = (
     "execution.sequence",
     "execution.continuity",
     "execution.pace",
+    "execution.divergence",
     "execution.watchdog",
     "execution.vote_chain",
     "execution.vote_horizon",

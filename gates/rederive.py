@@ -182,6 +182,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

@@ -239,6 +239,7 @@ class Cell:
             execution_horizon=self.horizons.execution_horizon,
             period_ns=self.period_ns,
             controller_mode=self.controller_mode,
+            divergence_limit_m=self.execution.maximum_divergence_m,
         )
 
 

@@ -22,6 +22,8 @@ from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
 class Place(StrEnum):
     """Where a question is asked."""
 
+    OBSERVED = "observed"
+    """Of an observation: may what was made before it still be used?"""
     DOOR = "door"
     """Of whatever arrives, before it is read."""
     ARRIVAL = "arrival"
@@ -175,6 +177,10 @@ def _in_declared_mode(m: Moment) -> bool:
     return bool(m.view.controller) and m.view.controller == m.view.controller_mode
 
 
+def _where_it_was_sent(m: Moment) -> bool:
+    return m.divergence_m is None or m.view.divergence_limit_m - m.divergence_m >= 0
+
+
 def _awake(m: Moment) -> bool:
     return m.last_accept_ns is None or m.watchdog_ns - (m.now_ns - m.last_accept_ns) >= 0
 
@@ -274,6 +280,7 @@ CHECKS: Checks = (
          _R.OUT_OF_ORDER, _P.STUB),
     _row("continuity", lambda m: m.follows is True, _R.BROKEN_PREDECESSOR, _P.NEXT, _P.STUB),
     _row("pace", _not_at_once, _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
+    _row("divergence", _where_it_was_sent, _R.OBSERVATION_DIVERGENCE, _P.OBSERVED),
     _row("watchdog", _awake, None, _P.SUPERVISOR),
 )  # fmt: skip
 """In the order in which they decide: the first row that does not hold names the reason."""

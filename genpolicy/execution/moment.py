@@ -62,6 +62,7 @@ class View:
         period_ns: Time between actions.
         controller: Mode that the controller says it is in; empty before it said one.
         controller_mode: The mode that it must be in.
+        divergence_limit_m: Measured from commanded TCP, beyond which chunks are void.
     """
 
     phase: str = ""
@@ -80,6 +81,7 @@ class View:
     period_ns: int = 0
     controller: str = ""
     controller_mode: str = ""
+    divergence_limit_m: float = 0.0
 
     def ignores(self, event_ns: int, now_ns: int) -> str:
         """Why an observation of this event time is not used now; empty where it is.
@@ -151,6 +153,8 @@ class Moment:
         last_accept_ns: When an action was accepted last; None before the first.
         follows: The way from the last command to this row is one that feasibility checked.
         watchdog_ns: Longest silence.
+        divergence_m: What an observation says that the measured TCP is off the commanded one; None
+            where it does not say, as of a replay without an arm.
     """
 
     now_ns: int
@@ -175,6 +179,7 @@ class Moment:
     last_accept_ns: int | None = None
     follows: bool | None = None
     watchdog_ns: int = 0
+    divergence_m: float | None = None
 
     @property
     def chunk(self) -> Chunk:

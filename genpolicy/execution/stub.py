@@ -66,11 +66,20 @@ class ControllerStub:
         self._continuity = Continuity()
 
     def note_observation(
-        self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
+        self,
+        now_ns: int,
+        event_ns: int,
+        phase: str,
+        calibration_epoch: str,
+        divergence_m: float | None = None,
     ) -> None:
-        """Its own view of phase, calibration and newest observation."""
+        """Its own view of phase, calibration and newest observation, and of where the arm is."""
         old, seen_ns = self._view, self._view.newest_observation_ns
-        if old.ignores(event_ns, now_ns):
+        ignored = old.ignores(event_ns, now_ns)
+        moment = Moment(now_ns=now_ns, view=old, divergence_m=divergence_m)
+        if refusal(self.checks, Place.OBSERVED, moment) is not None:
+            self.void(DiscardReason.OBSERVATION_DIVERGENCE, now_ns if ignored else event_ns)
+        if ignored:
             return
         if old.phase != phase and seen_ns is not None:
             self.void(DiscardReason.PHASE_TRANSITION, event_ns)

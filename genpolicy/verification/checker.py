@@ -341,7 +341,7 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         expected = {**ALWAYS, **(self.expected.declared() if self.expected else {})}
         self.settings = {**m, **expected}
-        self.world.fallback_hash = expected["fallback_hash"]
+        self.world.declare(self.settings)
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")

@@ -2,8 +2,9 @@
 
 A rollout states its measured state at every tick and where it ends. Here that is held against the
 joints that chunks were checked from, the observations that the policy saw (whose bytes are proved
-by their hashes), the peaks of the force, by MuJoCo's kinematics against itself, and from tick to
-tick against how fast the joints can turn: a state that was made up afterwards has to fit all five.
+by their hashes), the peaks of the force, by MuJoCo's kinematics against itself, from tick to tick
+against how fast the joints can turn, and how far an observation says that the arm is from the last
+command: a state that was made up afterwards has to fit all six.
 
 Not proved is what lies between: an arm that moved otherwise from one observation or checked chunk
 to the next, and no faster than it can; an opening of the gripper that no policy saw; and a force
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.contract.action import POSITION
 from genpolicy.contract.rotation import rotation_to_6d
 from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.journal_source import Message, floats
@@ -55,6 +57,7 @@ class Measured:
         self._arrived: list[int] = []
         self._last_ns = self._felt_ns = -1
         self._peak_n = 0.0
+        self._commanded_m: Array | None = None
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields where a state is missing, or another than was measured."""
@@ -77,6 +80,10 @@ class Measured:
             yield from self._checked_from(m)
         elif kind == "conditioning":
             yield from self._seen(m)
+        elif kind in ("accept", "fallback"):
+            self._commanded_m = floats(m["action"])[POSITION]
+        elif kind == "observation":
+            yield from self._diverged(m)
 
     def _state(self, m: Message) -> Iterator[Finding]:
         q_rad, tcp_m, turned = (
@@ -117,6 +124,16 @@ class Measured:
         more_n = force_n - self._peak_n
         if not (more_n <= ROUNDING and (self._felt_ns != self._last_ns or more_n >= -ROUNDING)):
             yield "state.force", f"{force_n} N is stated, and the peak is {self._peak_n} N."
+
+    def _diverged(self, m: Message) -> Iterator[Finding]:
+        """What an observation says that the arm is off is what lies between state and command."""
+        state = self._states.get(m["t"])
+        if state is None or self._commanded_m is None:
+            return
+        own_m = float(np.linalg.norm(state.pose[POSITION] - self._commanded_m))
+        told_m = m["divergence_m"]
+        if told_m is None or not abs(told_m - own_m) <= 2 * ROUNDING:
+            yield "state.divergence", f"The arm is {own_m:.6g} m off, {told_m} m are noted."
 
     def _checked_from(self, m: Message) -> Iterator[Finding]:
         motion = m["motion"]

@@ -30,19 +30,21 @@ class WorldView:
 
     Attributes:
         fallback_hash: Identity of the fallback planner, as declared by the session.
+        divergence_limit_m: What the measured TCP may be off the commanded one, likewise.
     """
 
     def __init__(self, expected: ExpectedSettings | None = None) -> None:
         self._most_n = max(expected.force_limit_n.values(), default=0.0) if expected else math.inf
         self._felt_n = 0.0
         self.fallback_hash = ""
+        self.divergence_limit_m = 0.0
         self.phase = self.epoch = ""
         self.newest_ns: int | None = None
         self.active = ("", "")
         self.session_epoch = 0
         self.mode = "run"
         self.controller = ""
-        self.stopped = self.looked = False
+        self.stopped = self._strayed = False
         self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
         self._arrivals = 0
@@ -52,6 +54,11 @@ class WorldView:
             "supervisor": self._supervise, "controller": self._change_controller,
             "candidate": self._judge,
         }  # fmt: skip
+
+    def declare(self, settings: Message) -> None:
+        """Take in what the session is held to."""
+        self.fallback_hash = settings["fallback_hash"]
+        self.divergence_limit_m = settings["maximum_divergence_m"]
 
     def follow(self, kind: str, m: Message, arrivals: int = 0) -> Iterator[Finding]:
         """Take an event in; yields what is wrong with the event itself.
@@ -73,12 +80,10 @@ class WorldView:
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
         elif kind == "invalidate":
-            if m["reason"] == "observation_divergence":
-                # Of an observation that was not used nothing is known but that it is here now.
-                newest_ns = self.newest_ns if self.looked else None
-                self._void("an observation divergence", m["t"] if newest_ns is None else newest_ns)
-            else:
+            if m["reason"] != "observation_divergence":
                 self._void(f"a {m['reason']}", m["t"])
+            elif not self._strayed:
+                yield "journal.divergence", "A divergence is noted, and none was observed."
         elif kind == "phase" and m["new"] != self.phase:
             yield "journal.phase", f"Phase {m['new']!r} is noted, {self.phase!r} was observed."
         elif kind == "epoch" and m["new"] != self.epoch:
@@ -162,7 +167,10 @@ class WorldView:
         used = event_ns <= t and not late
         if used != m["used"]:
             yield "journal.observation", f"An observation of {event_ns} ns, used: {m['used']}."
-        self.looked = used
+        self._strayed = self._has_strayed(m["divergence_m"])
+        if self._strayed:
+            # Of an observation that was not used nothing is known but that it is here now.
+            self._void("an observation divergence", event_ns if used else t)
         if not used:
             return
         if self.newest_ns is not None:
@@ -172,6 +180,10 @@ class WorldView:
                 self._void("a calibration change", event_ns)
         self.newest_ns = event_ns
         self.phase, self.epoch = m["phase"], m["calibration_epoch"]
+
+    def _has_strayed(self, away_m: float | None) -> bool:
+        """Whether the arm is not where it was sent; where nobody says, nothing is known."""
+        return away_m is not None and not 0.0 <= away_m <= self.divergence_limit_m
 
     def _supervise(self, m: Message) -> Iterator[Finding]:
         reset = m["event"] == "human_reset"

@@ -26,6 +26,7 @@ VIEW = View(
     maximum_age_ns=300 * MS, latest_first_row=15, checkpoint="w", sampler="s", fallback="f",
     session_epoch=1,
     execution_horizon=8, period_ns=50 * MS, controller="m", controller_mode="m",
+    divergence_limit_m=0.05,
 )  # fmt: skip
 GOOD = Moment(
     now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, issued=True, same_action=True,
@@ -33,6 +34,7 @@ GOOD = Moment(
     last_accept_ns=260 * MS, follows=True,
     accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
     queued_start_ns=200 * MS, newer_start_ns=350 * MS, waiting=1, capacity=2,
+    divergence_m=0.05,
 )  # fmt: skip
 
 
@@ -95,6 +97,7 @@ BAD = {
     "sequence": replace(GOOD, last_sequence=5),
     "continuity": replace(GOOD, follows=False),
     "pace": replace(GOOD, last_accept_ns=265 * MS + 1),
+    "divergence": replace(GOOD, divergence_m=0.0501),
     "watchdog": replace(GOOD, last_accept_ns=210 * MS - 1),
 }
 

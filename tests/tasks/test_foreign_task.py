@@ -237,6 +237,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         replan_lead_rows=cell.execution.replan_lead_rows,
         late_chunk=cell.execution.late_by_phase,
         force_limit_n=cell.execution.force_limit_n,
+        maximum_divergence_m=cell.execution.maximum_divergence_m,
     )
     motion = expected_motion(cell.checker.cell, rollouts[0].setup.task.action_at)
     report = check_journal(journal, expected, motion)

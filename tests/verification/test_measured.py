@@ -126,3 +126,18 @@ def test_without_a_robot_joints_and_tcp_are_not_held_together():
 
 def test_who_does_not_say_where_the_tcp_is_seen_is_not_asked():
     assert rules(*BOTH, saw(50, SEEN + 1.0), proof=robot(seen=None)) == []
+
+
+@pytest.mark.parametrize(("told_m", "found"), [
+    (0.3, []), (0.3000015, []), (0.29999, ["state.divergence"]), (None, ["state.divergence"]),
+])  # fmt: skip
+def test_how_far_the_arm_is_off_lies_between_state_and_command(told_m, found):
+    action = np.array([0.1, 0.2, 0.6, *COLUMNS, 0.01], dtype="<f8").tobytes().hex()
+    looks = [
+        ("observation", {"t": t * MS, "divergence_m": away_m})
+        for t, away_m in ((0, None), (50, told_m))
+    ]
+    journal = [SESSION, state(0), looks[0], ("accept", {"t": 0, "action": action}), state(50),
+               looks[1]]  # fmt: skip
+    view = Measured(robot())
+    assert [rule for kind, m in journal for rule, _ in view.follow(kind, m)] == found

@@ -6,11 +6,14 @@ from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.world_view import WorldView
 
 MS = 1_000_000
-SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
+SETTINGS = {
+    "maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m", "fallback_hash": "f",
+    "maximum_divergence_m": 0.05,
+}  # fmt: skip
 EXPECTED = ExpectedSettings(
     execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
     controller_mode="m", replan_lead_rows=3, late_chunk={},
-    force_limit_n={"approach": 20.0, "insert": 40.0},
+    force_limit_n={"approach": 20.0, "insert": 40.0}, maximum_divergence_m=0.05,
 )  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
@@ -19,18 +22,18 @@ CHUNK = {
 }  # fmt: skip
 
 
-def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None):
+def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None, away_m=None):
     event_ms = t_ms if event_ms is None else event_ms
     return list(view.follow("observation", {
         "t": t_ms * MS, "event_time_ns": event_ms * MS, "used": used, "phase": phase,
-        "calibration_epoch": epoch,
+        "calibration_epoch": epoch, "divergence_m": away_m,
     }))  # fmt: skip
 
 
 @pytest.fixture
 def view():
     made = WorldView()
-    made.fallback_hash = "f"
+    made.declare(SETTINGS)
     assert list(made.follow("active", {"checkpoint": "w", "sampler": "s"})) == []
     assert list(made.follow("controller", {"mode": "m", "t": 0})) == []
     assert observed(made, 1000) == []
@@ -182,10 +185,31 @@ def test_above_the_force_that_any_phase_bears_nothing_is_accepted(felt_n, found)
     """A supervisor that is deaf says nothing; what was measured does."""
     own, known = WorldView(EXPECTED), WorldView()
     for view in (own, known):
-        view.fallback_hash = "f"
+        view.declare(SETTINGS)
         list(view.follow("active", {"checkpoint": "w", "sampler": "s"}))
         list(view.follow("controller", {"mode": "m", "t": 0}))
         observed(view, 1000)
         assert list(view.follow("state", {"force_n": felt_n, "t": 1000 * MS})) == []
     assert rules(own) == found and rules(known) == []
     assert list(own.follow("state", {"force_n": 1.0, "t": 1050 * MS})) == [] and rules(own) == []
+
+
+@pytest.mark.parametrize(("away_m", "found"), [
+    (None, []), (0.05, []), (0.0501, ["P1.void"]), (-1.0, ["P1.void"]), (1.8e308, ["P1.void"]),
+])  # fmt: skip
+def test_a_divergence_voids_what_was_seen_before_though_nobody_heeds_it(view, away_m, found):
+    """An executor that compares with nothing says nothing; what was measured does."""
+    assert observed(view, 1050, away_m=away_m) == []
+    assert rules(view) == found and rules(view, condition_ns=1050 * MS, arrival=1) == []
+
+
+def test_a_divergence_of_what_is_not_used_voids_what_was_seen_before_it_came(view):
+    assert observed(view, 1100, event_ms=900, used=False, away_m=0.2) == []
+    assert rules(view) == ["P1.void"]
+
+
+@pytest.mark.parametrize(("away_m", "found"), [(0.04, ["journal.divergence"]), (0.06, [])])
+def test_a_divergence_that_nobody_observed_is_none(view, away_m, found):
+    observed(view, 1050, away_m=away_m)
+    noted = {"reason": "observation_divergence", "before_ns": 1050 * MS, "t": 1050 * MS}
+    assert [rule for rule, _ in view.follow("invalidate", noted)] == found

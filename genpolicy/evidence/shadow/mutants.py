@@ -55,7 +55,7 @@ def slipped_by(check: Check, table: Checks) -> int:
 
     Beyond those that pass both; 0 for a check that one of them asks alone.
     """
-    if Place.STUB not in check.places or not check.places - {Place.STUB, Place.LAYER}:
+    if not asked_twice(check):
         return 0
     blind = without(table, check.name)
     by_both = _played(check.name, table).stub.accepted
@@ -64,6 +64,12 @@ def slipped_by(check: Check, table: Checks) -> int:
         _played(check.name, table, stub_checks=blind),
     )
     return sum(max(0, rig.stub.accepted - by_both) for rig in alone)
+
+
+def asked_twice(check: Check) -> bool:
+    """Executor and stub both ask it."""
+    both = Place.STUB in check.places and bool(check.places - {Place.STUB, Place.LAYER})
+    return both or Place.OBSERVED in check.places
 
 
 def _played(check: str, checks: Checks, *, stub_checks: Checks | None = None) -> Rig:
@@ -302,6 +308,7 @@ SCENARIOS: dict[str, Scenario] = {
     "controller_mode": _new_chunk_in_another_mode,
     "commander": _then(lambda rig: rig.executor.begin_fallback(rig.now_s)),
     "duplicate": _same_chunk_twice,
+    "divergence": _then(_diverged),
     "early": _starts_later,
     "end_of_episode": _after_the_end,
     "execution_horizon": _whole_chunk,

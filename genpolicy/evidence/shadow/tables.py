@@ -137,6 +137,7 @@ def checker_document(
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
     )
     motion = expected_motion(robot, seen)
     return checked(

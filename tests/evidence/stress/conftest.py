@@ -132,6 +132,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
     )
     setup = rollouts[0].setup if rollouts else None
     motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
