@@ -183,6 +183,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
         maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

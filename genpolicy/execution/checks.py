@@ -17,6 +17,7 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.errors import ConfigError
 from genpolicy.execution.moment import FALLBACK, MODE_OF_SOURCE, ExecutorMode, Moment
 from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
+from genpolicy.execution.scene import moved_m
 
 
 class Place(StrEnum):
@@ -177,6 +178,10 @@ def _in_declared_mode(m: Moment) -> bool:
     return bool(m.view.controller) and m.view.controller == m.view.controller_mode
 
 
+def _in_this_scene(m: Moment) -> bool:
+    return m.view.scene_limit_m - moved_m(m.chunk.scene, m.view.scene) >= 0
+
+
 def _where_it_was_sent(m: Moment) -> bool:
     return m.divergence_m is None or m.view.divergence_limit_m - m.divergence_m >= 0
 
@@ -262,6 +267,7 @@ CHECKS: Checks = (
     _row("after_intervention", _after(_R.INTERVENTION), _R.INTERVENTION, *_LIVE),
     _row("after_stop", _after(_R.STOPPED), _R.STOPPED, *_LIVE),
     _row("after_reset", _after(_R.RESET), _R.RESET, *_LIVE),
+    _row("scene", _in_this_scene, _R.OBSERVATION_DIVERGENCE, *_LIVE),
     _timed("expired", _validity_margin_ns, _R.EXPIRED, *_LIVE, _P.LAYER),
     _row("early", lambda m: m.due_ns <= m.now_ns, _R.EXPIRED, _P.DUE, _P.STUB),
     _row("window", lambda m: m.now_ns < m.due_ns + m.view.period_ns,

@@ -37,7 +37,7 @@ _TYPES: Mapping[str, Json] = {
     ),
     **dict.fromkeys(
         ("force_n", "duration_s", "gripper_m", "maximum_divergence_m",
-         *(f"{term}_s" for term in Term)),
+         "maximum_scene_shift_m", *(f"{term}_s" for term in Term)),
         _NUMBER,
     ),
     **dict.fromkeys(("q_rad", "tcp_m", "tcp_rotation"), _NUMBERS),

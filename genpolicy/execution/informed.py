@@ -4,7 +4,10 @@ Each may void what is here. Whatever is wrong with what is said, nothing of it r
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
+
+from numpy.typing import ArrayLike
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.cell import Cell
@@ -12,7 +15,11 @@ from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.moment import Moment
 from genpolicy.execution.observed import Observed, name_of
+from genpolicy.execution.scene import read_scene
 from genpolicy.execution.stub import ControllerStub
+
+UNKNOWN: Mapping[str, tuple[ArrayLike, ArrayLike]] = {"": ((), ())}
+"""What the journal says of a scene that could not be read: a body that no scene has, nowhere."""
 
 
 class Informed(ABC):
@@ -102,6 +109,20 @@ class Informed(ABC):
                 self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
                 if before.newest_observation_ns is not None:
                     self._void(now_ns, reason, event_ns)
+
+    def see(self, now_s: float, poses: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
+        """Where the bodies of the scene are seen now; what was checked in another scene is void.
+
+        Args:
+            now_s: Time, s.
+            poses: Position, m, and unit quaternion, w x y z, by name. What cannot be read is a
+                scene that nobody knows, in which nothing is executed.
+        """
+        now_ns, scene = self._begin(now_s), read_scene(poses)
+        self._journal.scene(now_s, poses if scene is not None else UNKNOWN)
+        self.stub.note_scene(scene)
+        self._view = replace(self._view, scene=scene)
+        self._drop(now_ns, DiscardReason.OBSERVATION_DIVERGENCE)
 
     def force_event(self, now_s: float) -> None:
         """A force event: everything conditioned before now is void."""

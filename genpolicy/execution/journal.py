@@ -41,7 +41,8 @@ MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
                 "watchdog_ns", "queue_capacity", "replan_lead_rows", "late_chunk",
-                "fallback_hash", "controller_mode", "maximum_divergence_m", "checks_missing"),
+                "fallback_hash", "controller_mode", "maximum_divergence_m",
+                "maximum_scene_shift_m", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because",
                     "divergence_m"),
     "scene": ("bodies",),
@@ -252,6 +253,7 @@ def session_payload(
         "fallback_hash": FALLBACK_HASH,
         "controller_mode": cell.controller_mode,
         "maximum_divergence_m": cell.execution.maximum_divergence_m,
+        "maximum_scene_shift_m": cell.execution.maximum_scene_shift_m,
         "checks_missing": list(checks_missing),
     }
 

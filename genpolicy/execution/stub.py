@@ -22,6 +22,7 @@ from genpolicy.execution.continuity import Continuity, bytes_of
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.moment import ExecutorMode, Moment, View
+from genpolicy.execution.scene import Scene
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -88,6 +89,10 @@ class ControllerStub:
         self._view = self._cell.view_after(
             self._view, event_ns=event_ns, phase=phase, epoch=calibration_epoch
         )
+
+    def note_scene(self, scene: Scene | None) -> None:
+        """Where bodies were seen."""
+        self._view = replace(self._view, scene=scene)
 
     def note_active(self, checkpoint: str, sampler: str) -> None:
         """Which weights and sampler may command."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
+from genpolicy.verification.moved import moved_m
 
 Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
@@ -34,8 +35,8 @@ class WorldView:
     """
 
     def __init__(self, expected: ExpectedSettings | None = None) -> None:
-        self._most_n = max(expected.force_limit_n.values(), default=0.0) if expected else math.inf
-        self._felt_n = 0.0
+        self._limits_n = expected.force_limit_n if expected else None
+        self._felt_n, self._most_n, self._felt_ns = 0.0, math.inf, -1
         self.fallback_hash = ""
         self.divergence_limit_m = 0.0
         self.phase = self.epoch = ""
@@ -74,7 +75,8 @@ class WorldView:
         elif kind in self._followed:
             yield from self._followed[kind](m)
         elif kind == "state":
-            self._felt_n = m["force_n"]
+            self._felt_n, self._felt_ns = m["force_n"], m["t"]
+            self._most_n = self._bears_n()
         elif kind == "scene":
             self.scene = m["bodies"]
         elif kind == "active":
@@ -118,7 +120,11 @@ class WorldView:
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
         if not self._felt_n <= self._most_n + ROUNDING_N:
-            yield "P7.force", f"{self._felt_n} N are measured, and no phase bears them."
+            yield "P7.force", f"{self._felt_n} N are measured, the phase bears {self._most_n} N."
+        # A chunk that does not say what it was checked in is a violation of its own (P6.ground).
+        shift_m = moved_m(chunk["motion"]["scene"], self.scene) if chunk["motion"] else 0.0
+        if not shift_m <= settings["maximum_scene_shift_m"]:
+            yield "P1.scene", f"A body has moved by {shift_m:.3g} m since the chunk was checked."
         yield from self._voided(seen_ns, chunk["arrival"])
 
     def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:
@@ -180,6 +186,17 @@ class WorldView:
                 self._void("a calibration change", event_ns)
         self.newest_ns = event_ns
         self.phase, self.epoch = m["phase"], m["calibration_epoch"]
+        if self._felt_ns == t:  # felt on the way from one phase to the other: neither may be passed
+            self._most_n = min(self._most_n, self._bears_n())
+
+    def _bears_n(self) -> float:
+        """What may be felt in this phase; nothing in one that nobody names, before the first all.
+
+        Before the first observation there is no phase, and nothing that was made in one.
+        """
+        if self._limits_n is None or not self.phase:
+            return math.inf
+        return self._limits_n.get(self.phase, 0.0)
 
     def _has_strayed(self, away_m: float | None) -> bool:
         """Whether the arm is not where it was sent; where nobody says, nothing is known."""

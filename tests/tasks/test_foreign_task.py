@@ -238,6 +238,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         late_chunk=cell.execution.late_by_phase,
         force_limit_n=cell.execution.force_limit_n,
         maximum_divergence_m=cell.execution.maximum_divergence_m,
+        maximum_scene_shift_m=cell.execution.maximum_scene_shift_m,
     )
     motion = expected_motion(cell.checker.cell, rollouts[0].setup.task.action_at)
     report = check_journal(journal, expected, motion)

@@ -22,6 +22,7 @@ EXPECTED = ExpectedSettings(
     late_chunk=EXECUTION.late_by_phase,
     force_limit_n=EXECUTION.force_limit_n,
     maximum_divergence_m=EXECUTION.maximum_divergence_m,
+    maximum_scene_shift_m=EXECUTION.maximum_scene_shift_m,
 )
 
 

@@ -1,5 +1,6 @@
 """The checker's own picture of the present: each objection alone, and stops that stay."""
 
+import numpy as np
 import pytest
 
 from genpolicy.verification.expected import ExpectedSettings
@@ -8,17 +9,18 @@ from genpolicy.verification.world_view import WorldView
 MS = 1_000_000
 SETTINGS = {
     "maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m", "fallback_hash": "f",
-    "maximum_divergence_m": 0.05,
+    "maximum_divergence_m": 0.05, "maximum_scene_shift_m": 0.02,
 }  # fmt: skip
 EXPECTED = ExpectedSettings(
     execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
     controller_mode="m", replan_lead_rows=3, late_chunk={},
     force_limit_n={"approach": 20.0, "insert": 40.0}, maximum_divergence_m=0.05,
+    maximum_scene_shift_m=0.02,
 )  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
-    "arrival": 0,
+    "arrival": 0, "motion": None,
 }  # fmt: skip
 
 
@@ -180,9 +182,9 @@ def test_a_supervisor_has_few_words(view, event, state):
     assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.words"]
 
 
-@pytest.mark.parametrize(("felt_n", "found"), [(40.0, []), (40.01, ["P7.force"])])
-def test_above_the_force_that_any_phase_bears_nothing_is_accepted(felt_n, found):
-    """A supervisor that is deaf says nothing; what was measured does."""
+@pytest.mark.parametrize(("felt_n", "found"), [(20.0, []), (20.01, ["P7.force"])])
+def test_above_the_force_that_its_phase_bears_nothing_is_accepted(felt_n, found):
+    """A supervisor that is deaf says nothing; what was measured does. Another phase bears 40 N."""
     own, known = WorldView(EXPECTED), WorldView()
     for view in (own, known):
         view.declare(SETTINGS)
@@ -213,3 +215,36 @@ def test_a_divergence_that_nobody_observed_is_none(view, away_m, found):
     observed(view, 1050, away_m=away_m)
     noted = {"reason": "observation_divergence", "before_ns": 1050 * MS, "t": 1050 * MS}
     assert [rule for rule, _ in view.follow("invalidate", noted)] == found
+
+
+@pytest.mark.parametrize(("before", "now", "felt_n", "found"), [
+    ("approach", "insert", 30.0, ["P7.force"]), ("insert", "approach", 30.0, ["P7.force"]),
+    ("insert", "insert", 30.0, []), ("insert", "insert", 40.01, ["P7.force"]),
+    ("approach", "insert", 20.0, []), ("insert", "unknown", 1.0, ["P7.force"]),
+])  # fmt: skip
+def test_where_the_phase_changed_meanwhile_the_smaller_limit_holds(before, now, felt_n, found):
+    view = WorldView(EXPECTED)
+    view.declare(SETTINGS)
+    observed(view, 1000, phase=before)
+    assert list(view.follow("state", {"force_n": felt_n, "t": 1050 * MS})) == []
+    observed(view, 1050, phase=now)
+    assert [rule for rule in rules(view, t_ms=1050) if rule == "P7.force"] == found
+    assert list(view.follow("state", {"force_n": felt_n, "t": 1100 * MS})) == []
+    observed(view, 1100, phase=now)  # felt in this phase from the begin on
+    limit_n = {"approach": 20.0, "insert": 40.0}.get(now, 0.0)
+    assert ("P7.force" in rules(view, t_ms=1100)) == (felt_n > limit_n)
+
+
+def stands(x_m, y_m=0.0):
+    return {"post": np.array([x_m, y_m, 0.1, 1.0, 0.0, 0.0, 0.0], "<f8").tobytes().hex()}
+
+
+@pytest.mark.parametrize(("checked", "found"), [
+    (stands(0.5), []), (stands(0.51), []), (stands(0.5, 0.021), ["P1.scene"]), ({}, ["P1.scene"]),
+    ({"fixture": stands(0.5)["post"]}, ["P1.scene"]),
+])  # fmt: skip
+def test_a_chunk_that_was_checked_in_another_scene_than_the_one_seen_is_found(view, checked, found):
+    assert list(view.follow("scene", {"bodies": stands(0.5)})) == []
+    assert rules(view, motion={"scene": checked}) == found
+    assert list(view.follow("scene", {"bodies": {"": ""}})) == []
+    assert rules(view, motion={"scene": checked}) == ["P1.scene"]

@@ -10,6 +10,7 @@ actions through, or the second look is none. The chunks are imitations, so both 
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -273,6 +274,14 @@ def _diverged(rig: Rig) -> None:
     rig.observe(divergence_m=0.2)
 
 
+def _a_body_moves(rig: Rig) -> None:
+    """A chunk is checked with a post that is then seen elsewhere."""
+    rig.see(post=0.5)
+    _begin(rig)
+    rig.see(post=0.5 + 2 * rig.cell.execution.maximum_scene_shift_m)
+    rig.tick(2)
+
+
 def _offered(*, sequence: int, altered: bool) -> Scenario:
     """The second row comes to the stub past the executor."""
 
@@ -320,9 +329,10 @@ SCENARIOS: dict[str, Scenario] = {
     "out_of_order": _one_window_twice,
     "pace": _two_at_once,
     "period": _bad(action_period_s=0.1),
-    "issued": _bad(context=None),
+    "issued": _bad(verdict=replace(passing_verdict(), q_rad=cast(Any, None))),
     "phase_transition": _bad(task_phase="insert"),
     "predecessor": _bad(predecessor_chunk_id="never seen"),
+    "scene": _a_body_moves,
     "same_action": _offered(sequence=2, altered=True),
     "queue_overflow": _three_in_a_row,
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),

@@ -138,6 +138,7 @@ def checker_document(
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
         maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     motion = expected_motion(robot, seen)
     return checked(

@@ -83,7 +83,7 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P7.stop" in rules["stopped"]
     assert rules["controller_mode"] == {"P1.controller"}
     assert rules["issued"] == {"P6.ground"}
-    assert rules["divergence"] == {"P1.void"}
+    assert rules["divergence"] == {"P1.void"} and rules["scene"] == {"P1.scene"}
 
 
 def test_a_table_without_a_row_is_declared_and_a_table_with_another_row_too():

@@ -133,6 +133,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
         maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     setup = rollouts[0].setup if rollouts else None
     motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
