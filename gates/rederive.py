@@ -188,7 +188,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)
     cell = cell_of(task, feasibility, action_period_s=horizons.action_period_s)
-    return expected, expected_motion(cell, task.action_at)
+    return expected, expected_motion(cell, task.action_at, task.scene_poses)
 
 
 def _tables(

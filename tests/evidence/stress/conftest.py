@@ -136,7 +136,8 @@ def check(rollouts, folder, *, execution=EXECUTION):
         maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     setup = rollouts[0].setup if rollouts else None
-    motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
+    task = setup and setup.task
+    motion = setup and expected_motion(setup.checker.cell, task.action_at, task.scene_poses)
     return check_journal(path, expected, motion)
 
 
