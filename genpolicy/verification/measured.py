@@ -154,7 +154,7 @@ class Measured:
             )
             return
         before = self._states.get(motion["measured_ns"] - self._period_ns)
-        told = motion["dq_meas_rad_s"]
+        told = motion.get("dq_meas_rad_s")
         if before is None or before is state:
             if told is not None:
                 yield "state.velocity", f"{m['chunk_id']!r} states a velocity of one state."

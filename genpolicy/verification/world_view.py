@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
@@ -64,7 +65,8 @@ class WorldView:
         self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
             "observation": self._observe, "mode": self._change_mode, "reset": self._reset,
             "supervisor": self._supervise, "controller": self._change_controller,
-            "recovery": Failed().follow, "phase": self._note, "epoch": self._note,
+            "recovery": Failed().follow,
+            "phase": partial(self._note, "phase"), "epoch": partial(self._note, "epoch"),
             "candidate": self._judge, "invalidate": self._invalidate, "refuse": self._refuse,
         }  # fmt: skip
 
@@ -83,7 +85,8 @@ class WorldView:
         """
         self._arrivals = arrivals
         if self._changes and kind not in CHANGES:
-            yield "journal.changes", f"Nobody notes that {self._changes} changed."
+            for name, (old, new, _) in self._changes.items():
+                yield f"journal.{name}", f"It changed from {old!r} to {new!r}, and nobody notes it."
             self._changes.clear()
         if kind not in KINDS:
             yield "journal.kind", f"There is no event of kind {kind!r}."
@@ -163,14 +166,11 @@ class WorldView:
         if before_ns not in (None, m["before_ns"]):
             yield "journal.void", f"What is older than {before_ns} ns is void, {m['before_ns']}."
 
-    def _note(self, m: Message) -> Iterator[Finding]:
+    def _note(self, kind: str, m: Message) -> Iterator[Finding]:
         """What the newest observation changed is noted once, as it was."""
-        noted = m["old"], m["new"], m["event_time_ns"]
-        kind = next((kind for kind, change in self._changes.items() if change == noted), None)
-        if kind is None:
-            yield "journal.changes", f"{noted} is noted, observed was {self._changes or 'nothing'}."
-        else:
-            del self._changes[kind]
+        noted, own = (m.get("old"), m["new"], m.get("event_time_ns")), self._changes.pop(kind, None)
+        if noted != own:
+            yield f"journal.{kind}", f"{noted} is noted, observed was {own or 'no change'}."
 
     @staticmethod
     def _judge(m: Message) -> Iterator[Finding]:

@@ -26,10 +26,15 @@ CHUNK = {
 
 def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None, away_m=None):
     event_ms = t_ms if event_ms is None else event_ms
-    return list(view.follow("observation", {
+    said = list(view.follow("observation", {
         "t": t_ms * MS, "event_time_ns": event_ms * MS, "used": used, "phase": phase,
         "calibration_epoch": epoch, "divergence_m": away_m,
+        "ignored_because": "" if used else "older",
     }))  # fmt: skip
+    for kind, (old, new, event_ns) in list(view._changes.items()):
+        noted = {"old": old, "new": new, "event_time_ns": event_ns, "t": t_ms * MS}
+        assert list(view.follow(kind, noted)) == []
+    return said
 
 
 @pytest.fixture
@@ -248,3 +253,38 @@ def test_a_chunk_that_was_checked_in_another_scene_than_the_one_seen_is_found(vi
     assert rules(view, motion={"scene": checked}) == found
     assert list(view.follow("scene", {"bodies": {"": ""}})) == []
     assert rules(view, motion={"scene": checked}) == ["P1.scene"]
+
+
+def test_a_change_that_nobody_notes_or_notes_otherwise_is_found(view):
+    said = {"t": 1100 * MS, "event_time_ns": 1100 * MS, "used": True, "phase": "insert",
+            "calibration_epoch": "e1", "divergence_m": None, "ignored_because": ""}  # fmt: skip
+    assert list(view.follow("observation", said)) == []
+    ((rule, _),) = view.follow("scene", {"bodies": {}})
+    assert rule == "journal.phase" and list(view.follow("scene", {"bodies": {}})) == []
+    assert list(view.follow("observation", said | {"phase": "approach"})) == []
+    noted = {"old": "align", "new": "approach", "event_time_ns": 1100 * MS}
+    ((rule, _),) = view.follow("phase", noted)
+    assert rule == "journal.phase"
+
+
+@pytest.mark.parametrize(("events", "found"), [
+    ([("watchdog", "watchdog_hold"), ("watchdog_recovered", "run")], []),
+    ([("watchdog_recovered", "run")], ["P7.state"]), ([("watchdog", "run")], ["P7.state"]),
+    ([("watchdog", "watchdog_hold"), ("watchdog", "watchdog_hold")], ["P7.state"]),
+    ([("human_reset", "watchdog_hold")], ["P7.state"]), ([("human_reset", "run")], []),
+])  # fmt: skip
+def test_a_supervisor_goes_from_state_to_state(view, events, found):
+    told = [{"event": event, "state": state, "detail": "Ann", "t": 1100 * MS}
+            for event, state in events]  # fmt: skip
+    assert [rule for m in told for rule, _ in view.follow("supervisor", m)] == found
+
+
+@pytest.mark.parametrize(("steps", "found"), [
+    ([("hold", "retreat", 0), ("retreat", "hold", 1), ("retreat", "abort", 2)], []),
+    ([("retreat", "hold", 0)], ["P8.failures"]), ([("hold", "retreat", 1)], ["P8.failures"]),
+    ([("retreat", "abort", 1), ("abort", "stopped", 1), ("stopped", "idle", 0)], []),
+    ([("retreat", "abort", 1), ("abort", "idle", 1)], ["P8.failures"]),
+])  # fmt: skip
+def test_failed_primitives_are_counted(view, steps, found):
+    told = [{"old": old, "new": new, "failures": count, "cause": ""} for old, new, count in steps]
+    assert [rule for m in told for rule, _ in view.follow("recovery", m)] == found
