@@ -90,6 +90,8 @@ CHECKS_ASKED_FOR = (
     "execution.sequence",
     "execution.continuity",
     "execution.pace",
+    "execution.divergence",
+    "execution.scene",
     "execution.watchdog",
     "execution.vote_chain",
     "execution.vote_horizon",
@@ -98,6 +100,7 @@ CHECKS_ASKED_FOR = (
     "execution.deaf_to_force",
     "execution.deaf_to_collision",
     "execution.deaf_to_emergency_stop",
+    "execution.deaf_to_phase",
 )
 NOT_ASKED_OF_EVERY_TASK = (
     "geometric.scene_collision",
@@ -114,6 +117,7 @@ INCIDENTS_ASKED_FOR = {
     "phase_change_on_the_way": "phase_transition",
     "calibration_change_on_the_way": "calibration_mismatch",
     "divergence_on_the_way": "observation_divergence",
+    "moved_body_on_the_way": "observation_divergence",
     "force_event_on_the_way": "force_event",
     "collision_event_on_the_way": "collision_event",
     "force_stop_on_the_way": "stopped",

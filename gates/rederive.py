@@ -182,11 +182,13 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)
     cell = cell_of(task, feasibility, action_period_s=horizons.action_period_s)
-    return expected, expected_motion(cell, task.action_at)
+    return expected, expected_motion(cell, task.action_at, task.scene_poses)
 
 
 def _tables(

@@ -11,6 +11,7 @@ from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.moment import MODE_OF_SOURCE, Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
+from genpolicy.execution.scene import read_scene
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
@@ -52,6 +53,7 @@ def read_chunk(admitted: "Admitted", *, arrival: int, source: str) -> Chunk | No
             checked_rows=(first, last),
             passed=passed and bool(np.isfinite(actions).all()),
             hashed=actions_sha256(actions) == admitted.actions_sha256,
+            scene=read_scene(admitted.context.scene.bodies),
         )
     except Exception:  # of whatever it is, reading it may raise anything
         return None

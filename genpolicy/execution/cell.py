@@ -80,6 +80,9 @@ class ExecutionSettings(Settings):
             action on the controller's ticks (execution horizon minus one, times period), or it
             would refuse nothing; one number for all. A phase without one accepts nothing.
         maximum_divergence_m: Measured against commanded TCP, beyond which chunks are void.
+        maximum_scene_shift_m: How far a body of the scene may be seen from where it stood when a
+            chunk was checked; beyond it the chunk is void. The default is what perception shakes
+            by: two frames with white noise of 5 mm differ by more in one of fifty.
         force_limit_n: Contact force by phase at which the simulated supervisor stops; a phase
             without one has limit 0. A fixture of the simulation, not a value for any robot.
         hold_before_recovery_s: Silence after which recovery begins.
@@ -109,6 +112,7 @@ class ExecutionSettings(Settings):
     maximum_failures: int = Field(ge=1)
     recovery_plans: dict[str, tuple[RecoveryState, ...]]
     silence_stop_s: float | None = Field(default=None, gt=0)
+    maximum_scene_shift_m: NotNegative = 0.02
 
     @model_validator(mode="before")
     @classmethod
@@ -239,6 +243,9 @@ class Cell:
             execution_horizon=self.horizons.execution_horizon,
             period_ns=self.period_ns,
             controller_mode=self.controller_mode,
+            divergence_limit_m=self.execution.maximum_divergence_m,
+            scene={},
+            scene_limit_m=self.execution.maximum_scene_shift_m,
         )
 
 

@@ -17,11 +17,14 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.errors import ConfigError
 from genpolicy.execution.moment import FALLBACK, MODE_OF_SOURCE, ExecutorMode, Moment
 from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
+from genpolicy.execution.scene import moved_m
 
 
 class Place(StrEnum):
     """Where a question is asked."""
 
+    OBSERVED = "observed"
+    """Of an observation: may what was made before it still be used?"""
     DOOR = "door"
     """Of whatever arrives, before it is read."""
     ARRIVAL = "arrival"
@@ -175,6 +178,14 @@ def _in_declared_mode(m: Moment) -> bool:
     return bool(m.view.controller) and m.view.controller == m.view.controller_mode
 
 
+def _in_this_scene(m: Moment) -> bool:
+    return m.view.scene_limit_m - moved_m(m.chunk.scene, m.view.scene) >= 0
+
+
+def _where_it_was_sent(m: Moment) -> bool:
+    return m.divergence_m is None or m.view.divergence_limit_m - m.divergence_m >= 0
+
+
 def _awake(m: Moment) -> bool:
     return m.last_accept_ns is None or m.watchdog_ns - (m.now_ns - m.last_accept_ns) >= 0
 
@@ -256,6 +267,7 @@ CHECKS: Checks = (
     _row("after_intervention", _after(_R.INTERVENTION), _R.INTERVENTION, *_LIVE),
     _row("after_stop", _after(_R.STOPPED), _R.STOPPED, *_LIVE),
     _row("after_reset", _after(_R.RESET), _R.RESET, *_LIVE),
+    _row("scene", _in_this_scene, _R.OBSERVATION_DIVERGENCE, *_LIVE),
     _timed("expired", _validity_margin_ns, _R.EXPIRED, *_LIVE, _P.LAYER),
     _row("early", lambda m: m.due_ns <= m.now_ns, _R.EXPIRED, _P.DUE, _P.STUB),
     _row("window", lambda m: m.now_ns < m.due_ns + m.view.period_ns,
@@ -274,6 +286,7 @@ CHECKS: Checks = (
          _R.OUT_OF_ORDER, _P.STUB),
     _row("continuity", lambda m: m.follows is True, _R.BROKEN_PREDECESSOR, _P.NEXT, _P.STUB),
     _row("pace", _not_at_once, _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
+    _row("divergence", _where_it_was_sent, _R.OBSERVATION_DIVERGENCE, _P.OBSERVED),
     _row("watchdog", _awake, None, _P.SUPERVISOR),
 )  # fmt: skip
 """In the order in which they decide: the first row that does not hold names the reason."""

@@ -36,7 +36,9 @@ _TYPES: Mapping[str, Json] = {
         _WHOLE,
     ),
     **dict.fromkeys(
-        ("force_n", "duration_s", "gripper_m", *(f"{term}_s" for term in Term)), _NUMBER
+        ("force_n", "duration_s", "gripper_m", "maximum_divergence_m",
+         "maximum_scene_shift_m", *(f"{term}_s" for term in Term)),
+        _NUMBER,
     ),
     **dict.fromkeys(("q_rad", "tcp_m", "tcp_rotation"), _NUMBERS),
     **dict.fromkeys(("used", "in_contact"), _FLAG),
@@ -57,7 +59,10 @@ _BY_KIND: Mapping[tuple[str, str], Json] = {
     ("finish", "rows"): _ANY,
 }
 """What one name holds in one kind of event and not in another."""
-NOT_DESCRIBED = {("conditioning", "key"), ("candidate", "first_reason"), ("enqueue", "motion")}
+NOT_DESCRIBED = {
+    ("conditioning", "key"), ("candidate", "first_reason"), ("enqueue", "motion"),
+    ("observation", "divergence_m"),
+}  # fmt: skip
 """Fields that may be null, or that hold words beside numbers."""
 
 

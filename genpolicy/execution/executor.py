@@ -14,16 +14,16 @@ from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
+from genpolicy.execution.informed import Informed
 from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS
-from genpolicy.execution.observed import Observed, name_of, too_far
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
 
-class Executor:
+class Executor(Informed):
     """Queue, freshness and hand-over of admitted chunks; pure: every time is passed in.
 
     Args:
@@ -33,8 +33,6 @@ class Executor:
         checks: The table; a row that is missing is declared in the journal.
 
     Attributes:
-        observations_ignored: Observations dropped as older than one already used, or from the
-            future.
         mode: Who commands.
     """
 
@@ -46,97 +44,14 @@ class Executor:
         *,
         checks: Checks = CHECKS,
     ) -> None:
-        self.cell = cell
-        self.stub = stub
-        self.observations_ignored = 0
+        super().__init__(cell, journal, stub, checks)
         self.mode = ExecutorMode.RUN
-        self._journal = journal
-        self._checks = checks
-        self._view = cell.first_view()
         self._queue = ChunkQueue(cell.execution.queue_capacity, journal, checks)
         self._arrivals = Arrivals(self._queue, checks)
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = (stub.supervisor, 0)
         self._begun = False
-
-    # -- what the world says ------------------------------------------------------------------
-
-    def observe(
-        self,
-        now_s: float,
-        event_time_s: float,
-        phase: str,
-        calibration_epoch: str,
-        divergence_m: float | None = None,
-    ) -> bool:
-        """Whether an observation is used; one older than the newest is ignored and counted.
-
-        Args:
-            now_s: Time, s.
-            event_time_s: When its newest sensor was exposed, s.
-            phase: Task phase.
-            calibration_epoch: Calibration of its sensors.
-            divergence_m: Distance of measured from commanded TCP, if known, m.
-        """
-        now_ns = self._begin(now_s)
-        told = Observed.of(self._view, now_ns, event_time_s, phase, calibration_epoch)
-        self._journal.add("observation", now_ns, told.payload())
-        self.stub.note_observation(now_ns, told.event_ns, told.phase, told.calibration_epoch)
-        if told.ignored:
-            self.observations_ignored += 1
-        else:
-            self._look(now_ns, told)
-        # Whatever is wrong with the time of an observation, the distance was measured.
-        if too_far(divergence_m, self.cell.execution.maximum_divergence_m):
-            before_ns = now_ns if told.ignored else told.event_ns
-            self._invalidate(now_ns, before_ns, DiscardReason.OBSERVATION_DIVERGENCE)
-        return not told.ignored
-
-    def _look(self, now_ns: int, told: Observed) -> None:
-        """The view after an observation; another phase or calibration voids what is here."""
-        before, event_ns = self._view, told.event_ns
-        self._view = self.cell.view_after(
-            before, event_ns=event_ns, phase=told.phase, epoch=told.calibration_epoch
-        )
-        for kind, old, new, reason in (
-            ("phase", before.phase, told.phase, DiscardReason.PHASE_TRANSITION),
-            ("epoch", before.calibration_epoch, told.calibration_epoch,
-             DiscardReason.CALIBRATION_MISMATCH),
-        ):  # fmt: skip
-            if old != new:
-                self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
-                if before.newest_observation_ns is not None:
-                    self._void(now_ns, reason, event_ns)
-
-    def force_event(self, now_s: float) -> None:
-        """A force event: everything conditioned before now is void."""
-        now_ns = self._begin(now_s)
-        self._invalidate(now_ns, now_ns, DiscardReason.FORCE_EVENT)
-
-    def collision_event(self, now_s: float) -> None:
-        """A collision event: everything conditioned before now is void."""
-        now_ns = self._begin(now_s)
-        self._invalidate(now_ns, now_ns, DiscardReason.COLLISION_EVENT)
-
-    def set_active(self, now_s: float, checkpoint_hash: str, sampler_hash: str) -> None:
-        """Name the weights and the sampler that may command; what others made is discarded."""
-        now_ns = self._begin(now_s)
-        payload = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
-        self._journal.add("active", now_ns, payload)
-        self.stub.note_active(checkpoint_hash, sampler_hash)
-        self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
-        self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
-        self._drop(now_ns, DiscardReason.SAMPLER_MISMATCH)
-
-    def controller(self, now_s: float, mode: str) -> None:
-        """The mode that the controller is in; another one than before voids what is here."""
-        now_ns, before, mode = self._begin(now_s), self._view.controller, name_of(mode)
-        self._journal.add("controller", now_ns, {"mode": mode})
-        self.stub.note_controller(mode)
-        self._view = replace(self._view, controller=mode)
-        if before not in ("", mode):
-            self._void(now_ns, DiscardReason.STOPPED, now_ns)
 
     # -- who commands -------------------------------------------------------------------------
 

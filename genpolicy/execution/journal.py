@@ -31,7 +31,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 10
+JOURNAL_VERSION = 11
 CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
@@ -41,8 +41,10 @@ MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
                 "watchdog_ns", "queue_capacity", "replan_lead_rows", "late_chunk",
-                "fallback_hash", "controller_mode", "checks_missing"),
-    "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
+                "fallback_hash", "controller_mode", "maximum_divergence_m",
+                "maximum_scene_shift_m", "checks_missing"),
+    "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because",
+                    "divergence_m"),
     "scene": ("bodies",),
     "state": ("q_rad", "tcp_m", "tcp_rotation", "gripper_m", "force_n"),
     "exposure": ("sha256",),
@@ -250,6 +252,8 @@ def session_payload(
         "late_chunk": cell.execution.late_by_phase,
         "fallback_hash": FALLBACK_HASH,
         "controller_mode": cell.controller_mode,
+        "maximum_divergence_m": cell.execution.maximum_divergence_m,
+        "maximum_scene_shift_m": cell.execution.maximum_scene_shift_m,
         "checks_missing": list(checks_missing),
     }
 

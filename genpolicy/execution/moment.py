@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
+from genpolicy.execution.scene import Scene
 
 POLICY = "policy"
 FALLBACK = "fallback"
@@ -62,6 +63,9 @@ class View:
         period_ns: Time between actions.
         controller: Mode that the controller says it is in; empty before it said one.
         controller_mode: The mode that it must be in.
+        divergence_limit_m: Measured from commanded TCP, beyond which chunks are void.
+        scene: Where bodies were seen last; None where that cannot be read.
+        scene_limit_m: How far they may stand from where a chunk was checked with them.
     """
 
     phase: str = ""
@@ -80,6 +84,9 @@ class View:
     period_ns: int = 0
     controller: str = ""
     controller_mode: str = ""
+    divergence_limit_m: float = 0.0
+    scene: Scene | None = None
+    scene_limit_m: float = 0.0
 
     def ignores(self, event_ns: int, now_ns: int) -> str:
         """Why an observation of this event time is not used now; empty where it is.
@@ -111,6 +118,7 @@ class Chunk:
         checked_rows: First row that feasibility checked, and the row behind the last one.
         passed: All six layers passed and all actions are finite.
         hashed: The actions have the hash that was taken when they passed.
+        scene: Where bodies stood when it was checked; None where it does not say.
     """
 
     metadata: ChunkMetadata
@@ -121,6 +129,7 @@ class Chunk:
     checked_rows: tuple[int, int] = (0, 0)
     passed: bool = False
     hashed: bool = False
+    scene: Scene | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,6 +160,8 @@ class Moment:
         last_accept_ns: When an action was accepted last; None before the first.
         follows: The way from the last command to this row is one that feasibility checked.
         watchdog_ns: Longest silence.
+        divergence_m: What an observation says that the measured TCP is off the commanded one; None
+            where it does not say, as of a replay without an arm.
     """
 
     now_ns: int
@@ -175,6 +186,7 @@ class Moment:
     last_accept_ns: int | None = None
     follows: bool | None = None
     watchdog_ns: int = 0
+    divergence_m: float | None = None
 
     @property
     def chunk(self) -> Chunk:

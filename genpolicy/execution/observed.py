@@ -1,10 +1,14 @@
 """An observation as it is told: whatever its time, phase and distance are, reading never raises."""
 
+import math
+import sys
 from dataclasses import dataclass
 from numbers import Real
 
 from genpolicy.execution.moment import View
 from genpolicy.execution.nanoseconds import ns_or_none
+
+FARTHEST_M = sys.float_info.max
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,36 +20,50 @@ class Observed:
         phase: Task phase; empty where it is no name, and then nothing is allowed.
         calibration_epoch: Calibration of its sensors; the same.
         ignored: Why it is not used; empty where it is.
+        divergence_m: Distance of measured from commanded TCP; None where nobody says, and what is
+            said and is no distance is the largest that there is.
     """
 
     event_ns: int
     phase: str
     calibration_epoch: str
     ignored: str
+    divergence_m: float | None = None
 
     @classmethod
-    def of(
-        cls, view: View, now_ns: int, event_time_s: object, phase: object, epoch: object
+    def of(  # noqa: PLR0917
+        cls,
+        view: View,
+        now_ns: int,
+        event_time_s: object,
+        phase: object,
+        epoch: object,
+        divergence_m: object = None,
     ) -> "Observed":
         """What is told now, seen from a view of the present."""
         told_ns = ns_or_none(event_time_s)
         event_ns = now_ns + 1 if told_ns is None else told_ns
-        return cls(event_ns, name_of(phase), name_of(epoch), view.ignores(event_ns, now_ns))
+        ignored = view.ignores(event_ns, now_ns)
+        return cls(event_ns, name_of(phase), name_of(epoch), ignored, distance_of(divergence_m))
 
     def payload(self) -> dict[str, object]:
         """For the journal."""
         return {
             "event_time_ns": self.event_ns, "phase": self.phase,
             "calibration_epoch": self.calibration_epoch, "used": not self.ignored,
-            "ignored_because": self.ignored,
+            "ignored_because": self.ignored, "divergence_m": self.divergence_m,
         }  # fmt: skip
 
 
-def too_far(divergence_m: float | None, limit_m: float) -> bool:
-    """Whether the arm is not where it was sent; what is no distance is too far, None is unknown."""
-    if divergence_m is None:
-        return False
-    return not (isinstance(divergence_m, Real) and 0.0 <= divergence_m <= limit_m)
+def distance_of(value: object) -> float | None:
+    """A distance, m; the largest there is of what is said and is none, None where nothing is."""
+    if value is None:
+        return None
+    try:
+        told_m = float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:
+        return FARTHEST_M
+    return told_m if 0.0 <= told_m <= FARTHEST_M else FARTHEST_M
 
 
 def name_of(value: object) -> str:

@@ -22,6 +22,7 @@ from genpolicy.execution.continuity import Continuity, bytes_of
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.moment import ExecutorMode, Moment, View
+from genpolicy.execution.scene import Scene
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -66,11 +67,20 @@ class ControllerStub:
         self._continuity = Continuity()
 
     def note_observation(
-        self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
+        self,
+        now_ns: int,
+        event_ns: int,
+        phase: str,
+        calibration_epoch: str,
+        divergence_m: float | None = None,
     ) -> None:
-        """Its own view of phase, calibration and newest observation."""
+        """Its own view of phase, calibration and newest observation, and of where the arm is."""
         old, seen_ns = self._view, self._view.newest_observation_ns
-        if old.ignores(event_ns, now_ns):
+        ignored = old.ignores(event_ns, now_ns)
+        moment = Moment(now_ns=now_ns, view=old, divergence_m=divergence_m)
+        if refusal(self.checks, Place.OBSERVED, moment) is not None:
+            self.void(DiscardReason.OBSERVATION_DIVERGENCE, now_ns if ignored else event_ns)
+        if ignored:
             return
         if old.phase != phase and seen_ns is not None:
             self.void(DiscardReason.PHASE_TRANSITION, event_ns)
@@ -79,6 +89,10 @@ class ControllerStub:
         self._view = self._cell.view_after(
             self._view, event_ns=event_ns, phase=phase, epoch=calibration_epoch
         )
+
+    def note_scene(self, scene: Scene | None) -> None:
+        """Where bodies were seen."""
+        self._view = replace(self._view, scene=scene)
 
     def note_active(self, checkpoint: str, sampler: str) -> None:
         """Which weights and sampler may command."""

@@ -6,6 +6,7 @@ monitor carries the assurance, the learned function does not). One that takes ov
 session cannot know whether a stop stood: it begins stopped.
 """
 
+import math
 from enum import StrEnum
 from numbers import Real
 
@@ -56,6 +57,7 @@ class Supervisor:
         silence_s = settings.silence_stop_s
         self._silence_ns = None if silence_s is None else to_ns(silence_s)
         self._last_accept_ns: int | None = None
+        self._before_n = math.inf
         if len(journal):
             self._stop(journal.latest_ns, SupervisorState.PROTECTIVE_STOP, "restarted", "")
 
@@ -67,6 +69,9 @@ class Supervisor:
     def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
         """Force gate; trips a protective stop above the phase's limit, and on what is no force.
 
+        A force since the last call was felt in the phase of that call or in this one: where they
+        differ the smaller limit holds.
+
         Args:
             now_s: Time, s.
             force_n: Largest contact force since the last call, N.
@@ -75,14 +80,18 @@ class Supervisor:
         Returns:
             Whether it tripped.
         """
-        limits = self.settings.force_limit_n
-        limit_n = limits.get(phase, 0.0) if isinstance(phase, str) else 0.0
+        here_n = self._bears_n(phase)
+        limit_n, self._before_n = min(here_n, self._before_n), here_n
         # A force is a size: one that is negative, unknown or no number was not measured.
         if isinstance(force_n, Real) and 0.0 <= force_n <= limit_n:
             return False
         detail = f"{_text(force_n)} N {_text(phase)}"
         self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "force", detail)
         return True
+
+    def _bears_n(self, phase: str) -> float:
+        limits = self.settings.force_limit_n
+        return limits.get(phase, 0.0) if isinstance(phase, str) else 0.0
 
     def observe_collision(self, now_s: float, collision: bool) -> bool:
         """Collision gate; trips a protective stop, unless told that there is none.

@@ -1,9 +1,9 @@
 """The figures of a cell that the independent checker holds executed rows against."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.impedance import STIFFNESS_N_M
@@ -14,12 +14,17 @@ from genpolicy.verification.projected import ExpectedProjection
 Array = NDArray[np.float64]
 
 
-def expected_motion(robot: Cell, seen: Callable[[Array], Array] | None = None) -> ExpectedMotion:
+def expected_motion(
+    robot: Cell,
+    seen: Callable[[Array], Array] | None = None,
+    placed: Callable[[Array], Mapping[str, tuple[ArrayLike, ArrayLike]]] | None = None,
+) -> ExpectedMotion:
     """What the independent checker holds executed rows against: figures, none of the layers.
 
     Args:
         robot: The cell.
         seen: The task's `action_at`, where observations shall be held against measured states.
+        placed: The task's `scene_poses`, where they shall be held against the scene on record.
     """
     limits, settings = robot.usable_limits, robot.settings
     return ExpectedMotion(
@@ -51,4 +56,5 @@ def expected_motion(robot: Cell, seen: Callable[[Array], Array] | None = None) -
             turned_rad=settings.rotation_change_limit_rad,
         ),
         seen=seen,
+        placed=placed,
     )

@@ -39,6 +39,8 @@ class Arrived:
                 yield "sensor.exposed", f"At {m['t']} ns more is exposed than once a tick."
             self._exposed[m["t"]], self._unobserved = m["sha256"], m["t"]
         elif kind == "observation":
+            if m.get("event_time_ns", m["t"]) != m["t"]:
+                yield "sensor.exposed", f"At {m['t']} ns {m['event_time_ns']} ns are observed."
             if self._unobserved != m["t"]:
                 yield "sensor.exposed", f"The tick at {m['t']} ns exposes nothing."
             self._unobserved = None

@@ -90,10 +90,8 @@ class _Session:
         self.continuity = Continuity(proof)
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
-        self.closed: set[int] = set()
         self.head: tuple[int, str] | None = None
-        self.n = -1
-        self.t = -(1 << 62)
+        self.n, self.t = -1, -(1 << 62)
         self.ended = False
         self.last_sequence = -1
         self.last_start_ns: int | None = None
@@ -321,6 +319,8 @@ class _Session:
 
     def _check_close(self, kind: str, m: Message) -> None:
         arrival, reason = m["arrival"], str(m["reason"]) if kind == "discard" else None
+        if kind == "discard" and m["at"] != self.world.place_of(m, arrival in self.open):
+            self.flag("journal.refused", f"{m['chunk_id']!r} is not discarded at {m['at']!r}.")
         if m.get("at") == "arrival":
             self.report.chunks += 1
             for sentence in self.balance.refused(arrival, m["rows"], str(reason)):
@@ -341,7 +341,7 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         expected = {**ALWAYS, **(self.expected.declared() if self.expected else {})}
         self.settings = {**m, **expected}
-        self.world.fallback_hash = expected["fallback_hash"]
+        self.world.declare(self.settings)
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")

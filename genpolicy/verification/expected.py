@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-ALWAYS = {"version": 10, "fallback_hash": "classical-fallback"}
+ALWAYS = {"version": 11, "fallback_hash": "classical-fallback"}
 """What every session declares: the journal that is read here, since in another one the same words
 may mean something else, and who makes the fallback's chunks, since nobody else commands as such."""
 
@@ -23,7 +23,11 @@ class ExpectedSettings:
         late_chunk: `continue`, `hold` or `fallback`, by phase; only where a phase says `continue`
             may a late chunk be executed.
         force_limit_n: Force at which the supervisor stops, by phase. A journal does not declare
-            it; above all of them nothing may be accepted.
+            it; above the one of the phase in which it was measured nothing may be accepted.
+        maximum_divergence_m: Distance of measured from commanded TCP beyond which what was made
+            before is void.
+        maximum_scene_shift_m: How far a body may be seen from where it stood when a chunk was
+            checked; beyond it nothing of the chunk may be accepted.
     """
 
     execution_horizon: int
@@ -35,6 +39,8 @@ class ExpectedSettings:
     replan_lead_rows: int
     late_chunk: dict[str, str]
     force_limit_n: dict[str, float]
+    maximum_divergence_m: float
+    maximum_scene_shift_m: float
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""
@@ -47,4 +53,6 @@ class ExpectedSettings:
             "controller_mode": self.controller_mode,
             "replan_lead_rows": self.replan_lead_rows,
             "late_chunk": self.late_chunk,
+            "maximum_divergence_m": self.maximum_divergence_m,
+            "maximum_scene_shift_m": self.maximum_scene_shift_m,
         }

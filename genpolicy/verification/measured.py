@@ -2,8 +2,9 @@
 
 A rollout states its measured state at every tick and where it ends. Here that is held against the
 joints that chunks were checked from, the observations that the policy saw (whose bytes are proved
-by their hashes), the peaks of the force, by MuJoCo's kinematics against itself, and from tick to
-tick against how fast the joints can turn: a state that was made up afterwards has to fit all five.
+by their hashes), the peaks of the force, by MuJoCo's kinematics against itself, from tick to tick
+against how fast the joints can turn, and how far an observation says that the arm is from the last
+command: a state that was made up afterwards has to fit all six.
 
 Not proved is what lies between: an arm that moved otherwise from one observation or checked chunk
 to the next, and no faster than it can; an opening of the gripper that no policy saw; and a force
@@ -12,12 +13,13 @@ below the largest so far.
 
 import math
 from bisect import insort
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.contract.action import POSITION
 from genpolicy.contract.rotation import rotation_to_6d
 from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.journal_source import Message, floats
@@ -55,17 +57,20 @@ class Measured:
         self._arrived: list[int] = []
         self._last_ns = self._felt_ns = -1
         self._peak_n = 0.0
+        self._commanded_m: Array | None = None
+        self._period_ns = 0
+        self._scenes: dict[int, Mapping[str, str]] = {}
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields where a state is missing, or another than was measured."""
         if kind == "session":
-            self._timed = TIMED in m["labels"]
+            self._timed, self._period_ns = TIMED in m["labels"], m.get("period_ns", 0)
         elif not self._timed:
             return
         elif kind == "state":
             yield from self._state(m)
-        elif kind == "arrived":
-            insort(self._arrived, m["exposed_ns"])
+        elif kind in ("scene", "arrived", "accept", "fallback"):
+            self._take(kind, m)
         elif kind in ("exposure", "end"):
             if m["t"] != self._last_ns:
                 yield "state.missing", f"No state is stated at {m['t']} ns."
@@ -77,6 +82,17 @@ class Measured:
             yield from self._checked_from(m)
         elif kind == "conditioning":
             yield from self._seen(m)
+        elif kind == "observation":
+            yield from self._diverged(m)
+
+    def _take(self, kind: str, m: Message) -> None:
+        """What others hold to account, and states are held against."""
+        if kind == "scene":
+            self._scenes[m["t"]] = m["bodies"]
+        elif kind == "arrived":
+            insort(self._arrived, m["exposed_ns"])
+        else:
+            self._commanded_m = floats(m["action"])[POSITION]
 
     def _state(self, m: Message) -> Iterator[Finding]:
         q_rad, tcp_m, turned = (
@@ -118,6 +134,16 @@ class Measured:
         if not (more_n <= ROUNDING and (self._felt_ns != self._last_ns or more_n >= -ROUNDING)):
             yield "state.force", f"{force_n} N is stated, and the peak is {self._peak_n} N."
 
+    def _diverged(self, m: Message) -> Iterator[Finding]:
+        """What an observation says that the arm is off is what lies between state and command."""
+        state = self._states.get(m["t"])
+        if state is None or self._commanded_m is None:
+            return
+        own_m = float(np.linalg.norm(state.pose[POSITION] - self._commanded_m))
+        told_m = m["divergence_m"]
+        if told_m is None or not abs(told_m - own_m) <= 2 * ROUNDING:
+            yield "state.divergence", f"The arm is {own_m:.6g} m off, {told_m} m are noted."
+
     def _checked_from(self, m: Message) -> Iterator[Finding]:
         motion = m["motion"]
         state, q_rad = self._states.get(motion["measured_ns"]), floats(motion["q_meas_rad"])
@@ -125,6 +151,21 @@ class Measured:
             yield (
                 "state.joints",
                 f"{m['chunk_id']!r} was checked from other joints than are stated.",
+            )
+            return
+        before = self._states.get(motion["measured_ns"] - self._period_ns)
+        told = motion.get("dq_meas_rad_s")
+        if before is None or before is state:
+            if told is not None:
+                yield "state.velocity", f"{m['chunk_id']!r} states a velocity of one state."
+            return
+        period_s = self._period_ns / 1e9
+        moved = (state.q_rad - before.q_rad) / period_s
+        # Both joint positions of each have six decimals.
+        if told is None or not np.all(np.abs(floats(told) - moved) <= 2 * ROUNDING / period_s):
+            yield (
+                "state.velocity",
+                f"{m['chunk_id']!r} was checked at another velocity.",
             )
 
     def _seen(self, m: Message) -> Iterator[Finding]:
@@ -138,12 +179,25 @@ class Measured:
             return
         history = floats(m["history"]).reshape(rows, -1)
         for row, tick_ns in zip(history, [seen[0]] * (rows - len(seen)) + seen, strict=True):
+            yield from self._placed(m, row, tick_ns)
             state = self._states.get(tick_ns)
             if state is None or not _same(state.pose, pose_of(row)):
                 yield (
                     "state.seen",
                     f"Invocation {m['id']!r} saw the TCP of {tick_ns} ns otherwise than stated.",
                 )
+
+    def _placed(self, m: Message, row: Array, tick_ns: int) -> Iterator[Finding]:
+        """The scene of a tick is the one that its observation shows."""
+        poses_of = None if self._proof is None else self._proof.expected.placed
+        if poses_of is None:
+            return
+        told, shown = self._scenes.get(tick_ns, {}), poses_of(row)
+        if told.keys() != shown.keys() or not all(
+            _same(floats(told[name]), np.concatenate([np.ravel(part) for part in shown[name]]))
+            for name in shown
+        ):
+            yield "state.scene", f"Invocation {m['id']!r} saw the scene of {tick_ns} ns otherwise."
 
 
 def _same(stated: Array, measured: Array) -> bool:

@@ -8,7 +8,7 @@ What may be done with a held object is `contact`'s.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
@@ -59,6 +59,7 @@ class ExpectedMotion:
         projection: What may be made of a chunk before it is admitted.
         seen: Pose of the TCP and opening, as an action (10,), that an observation (D_o,) shows;
             None: what was seen is not held against what was measured.
+        placed: Bodies that it shows, by name; None: likewise of the scene on record.
     """
 
     scene_path: Path
@@ -75,6 +76,7 @@ class ExpectedMotion:
     contact: ExpectedContact
     projection: ExpectedProjection
     seen: Callable[[Array], Array] | None = None
+    placed: Callable[[Array], Mapping[str, tuple[ArrayLike, ArrayLike]]] | None = None
 
 
 class MotionProof:
@@ -133,8 +135,7 @@ class MotionProof:
             period_s: The controller's period, s.
         """
         motion = chunk["motion"]
-        joints = self._joints
-        first, last = chunk["checked_rows"]
+        joints, (first, last) = self._joints, chunk["checked_rows"]
         path = floats(motion["q_rad"])
         q_cmd, told = floats(motion["q_cmd_rad"]), floats(motion["last_action"])
         if motion["joints"] != joints or path.size != (last - first) * joints:

@@ -45,3 +45,19 @@ class Recovering:
                 yield "P8.recovery", f"From {self.state!r} recovery goes {old!r} to {new!r}."
             self.state = new
             self.called |= new in CALLS
+
+
+class Failed:
+    """Counts the primitives that failed: out of each the arm holds, or recovery is given up."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def follow(self, m: Message) -> Iterator[Finding]:
+        """Take a `recovery` event in; yields a count that is another one."""
+        if m["old"] in (STOPPED, ABORTED) and m["new"] == IDLE:
+            self._count = 0  # a person let it begin anew
+        self._count += m["old"] in PRIMITIVES and m["new"] in (HOLD, ABORTED)
+        if m["failures"] != self._count:
+            yield "P8.failures", f"{self._count} primitives failed, {m['failures']} are noted."
+        self._count = m["failures"]

@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
+from genpolicy.verification.moved import moved_m
+from genpolicy.verification.recovering import Failed
 
 Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
@@ -14,6 +17,12 @@ STATES = frozenset({"run", "watchdog_hold", *STOP_STATES})
 STOPPING = frozenset({"force", "collision", "emergency_stop", "silence", "restarted"})
 """Events of a supervisor that leave it in a stop."""
 EVENTS = STOPPING | {"human_reset", "watchdog", "watchdog_recovered"}
+CHANGES = ("phase", "epoch")
+MODES = ("run", "fallback", "intervention", "ended")
+VOIDING = (
+    "force_event", "collision_event", "observation_divergence", "intervention", "stopped",
+)  # fmt: skip
+"""Reasons for which an executor says that what is older is void."""
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
     "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
@@ -30,28 +39,41 @@ class WorldView:
 
     Attributes:
         fallback_hash: Identity of the fallback planner, as declared by the session.
+        divergence_limit_m: What the measured TCP may be off the commanded one, likewise.
     """
 
     def __init__(self, expected: ExpectedSettings | None = None) -> None:
-        self._most_n = max(expected.force_limit_n.values(), default=0.0) if expected else math.inf
-        self._felt_n = 0.0
+        self._limits_n = expected.force_limit_n if expected else None
+        self._felt_n, self._most_n, self._felt_ns = 0.0, math.inf, -1
         self.fallback_hash = ""
+        self.divergence_limit_m = 0.0
         self.phase = self.epoch = ""
         self.newest_ns: int | None = None
         self.active = ("", "")
         self.session_epoch = 0
         self.mode = "run"
         self.controller = ""
-        self.stopped = self.looked = False
+        self.stopped = False
+        self._strayed_ns: int | None = None
         self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
         self._arrivals = 0
         self._void_arrivals: dict[str, int] = {}
+        self._changes: dict[str, tuple[str, str, int]] = {}
+        self._state = "run"
+        self._refusal: tuple[object, ...] = ()
         self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
             "observation": self._observe, "mode": self._change_mode, "reset": self._reset,
             "supervisor": self._supervise, "controller": self._change_controller,
-            "candidate": self._judge,
+            "recovery": Failed().follow,
+            "phase": partial(self._note, "phase"), "epoch": partial(self._note, "epoch"),
+            "candidate": self._judge, "invalidate": self._invalidate, "refuse": self._refuse,
         }  # fmt: skip
+
+    def declare(self, settings: Message) -> None:
+        """Take in what the session is held to."""
+        self.fallback_hash = settings["fallback_hash"]
+        self.divergence_limit_m = settings["maximum_divergence_m"]
 
     def follow(self, kind: str, m: Message, arrivals: int = 0) -> Iterator[Finding]:
         """Take an event in; yields what is wrong with the event itself.
@@ -62,27 +84,21 @@ class WorldView:
             arrivals: Chunks that arrived before it.
         """
         self._arrivals = arrivals
+        if self._changes and kind not in CHANGES:
+            for name, (old, new, _) in self._changes.items():
+                yield f"journal.{name}", f"It changed from {old!r} to {new!r}, and nobody notes it."
+            self._changes.clear()
         if kind not in KINDS:
             yield "journal.kind", f"There is no event of kind {kind!r}."
         elif kind in self._followed:
             yield from self._followed[kind](m)
         elif kind == "state":
-            self._felt_n = m["force_n"]
+            self._felt_n, self._felt_ns = m["force_n"], m["t"]
+            self._most_n = self._bears_n()
         elif kind == "scene":
             self.scene = m["bodies"]
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
-        elif kind == "invalidate":
-            if m["reason"] == "observation_divergence":
-                # Of an observation that was not used nothing is known but that it is here now.
-                newest_ns = self.newest_ns if self.looked else None
-                self._void("an observation divergence", m["t"] if newest_ns is None else newest_ns)
-            else:
-                self._void(f"a {m['reason']}", m["t"])
-        elif kind == "phase" and m["new"] != self.phase:
-            yield "journal.phase", f"Phase {m['new']!r} is noted, {self.phase!r} was observed."
-        elif kind == "epoch" and m["new"] != self.epoch:
-            yield "journal.epoch", f"Epoch {m['new']!r} is noted, {self.epoch!r} was observed."
 
     def objections(self, chunk: Message, kind: str, t: int, settings: Message) -> Iterator[Finding]:
         """Why an action of this chunk may not be accepted at `t`; nothing if it may."""
@@ -113,7 +129,11 @@ class WorldView:
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
         if not self._felt_n <= self._most_n + ROUNDING_N:
-            yield "P7.force", f"{self._felt_n} N are measured, and no phase bears them."
+            yield "P7.force", f"{self._felt_n} N are measured, the phase bears {self._most_n} N."
+        # A chunk that does not say what it was checked in is a violation of its own (P6.ground).
+        shift_m = moved_m(chunk["motion"]["scene"], self.scene) if chunk["motion"] else 0.0
+        if not shift_m <= settings["maximum_scene_shift_m"]:
+            yield "P1.scene", f"A body has moved by {shift_m:.3g} m since the chunk was checked."
         yield from self._voided(seen_ns, chunk["arrival"])
 
     def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:
@@ -123,6 +143,34 @@ class WorldView:
             # What is as new as the event is void all the same if it was here when it happened.
             elif arrival < self._void_arrivals[cause]:
                 yield "P1.void", f"{cause} at {before_ns} ns voids what had arrived, as {arrival}."
+
+    def place_of(self, m: Message, queued: bool) -> str:
+        """Where a chunk was discarded: at the stub if that has just refused it for this reason."""
+        refused = self._refusal == (m["arrival"], m["chunk_id"], m["reason"], m["t"])
+        return "arrival" if not queued else "stub" if refused else "queue"
+
+    def _refuse(self, m: Message) -> Iterator[Finding]:
+        self._refusal = (m["arrival"], m["chunk_id"], m["reason"], m["t"])
+        yield from ()
+
+    def _invalidate(self, m: Message) -> Iterator[Finding]:
+        before_ns = m["t"]
+        if m["reason"] != "observation_divergence":
+            self._void(f"a {m['reason']}", before_ns)
+        else:
+            before_ns = self._strayed_ns
+            if before_ns is None:
+                yield "journal.divergence", "A divergence is noted, and none was observed."
+        if m["reason"] not in VOIDING:
+            yield "journal.void", f"Nothing is void for {m['reason']!r}."
+        if before_ns not in (None, m["before_ns"]):
+            yield "journal.void", f"What is older than {before_ns} ns is void, {m['before_ns']}."
+
+    def _note(self, kind: str, m: Message) -> Iterator[Finding]:
+        """What the newest observation changed is noted once, as it was."""
+        noted, own = (m.get("old"), m["new"], m.get("event_time_ns")), self._changes.pop(kind, None)
+        if noted != own:
+            yield f"journal.{kind}", f"{noted} is noted, observed was {own or 'no change'}."
 
     @staticmethod
     def _judge(m: Message) -> Iterator[Finding]:
@@ -136,6 +184,8 @@ class WorldView:
             )
 
     def _change_mode(self, m: Message) -> Iterator[Finding]:
+        if m["new"] not in MODES:
+            yield "journal.mode", f"There is no mode {m['new']!r}."
         if m["old"] != self.mode:
             yield "journal.mode", f"Mode {m['old']!r} is left, but {self.mode!r} was entered."
         self.mode = m["new"]
@@ -160,9 +210,14 @@ class WorldView:
         event_ns, t = m["event_time_ns"], m["t"]
         late = self.newest_ns is not None and event_ns < self.newest_ns
         used = event_ns <= t and not late
-        if used != m["used"]:
+        why = "" if used else "future" if event_ns > t else "older"
+        if (used, why) != (m["used"], m["ignored_because"]):
             yield "journal.observation", f"An observation of {event_ns} ns, used: {m['used']}."
-        self.looked = used
+        self._strayed_ns = None
+        if self._has_strayed(m["divergence_m"]):
+            # Of an observation that was not used nothing is known but that it is here now.
+            self._strayed_ns = event_ns if used else t
+            self._void("an observation divergence", self._strayed_ns)
         if not used:
             return
         if self.newest_ns is not None:
@@ -170,8 +225,30 @@ class WorldView:
                 self._void("a phase transition", event_ns)
             if m["calibration_epoch"] != self.epoch:
                 self._void("a calibration change", event_ns)
+        self._changes = {
+            kind: (old, new, event_ns)
+            for kind, old, new in (
+                ("phase", self.phase, m["phase"]), ("epoch", self.epoch, m["calibration_epoch"]),
+            )
+            if old != new
+        }  # fmt: skip
         self.newest_ns = event_ns
         self.phase, self.epoch = m["phase"], m["calibration_epoch"]
+        if self._felt_ns == t:  # felt on the way from one phase to the other: neither may be passed
+            self._most_n = min(self._most_n, self._bears_n())
+
+    def _bears_n(self) -> float:
+        """What may be felt in this phase; nothing in one that nobody names, before the first all.
+
+        Before the first observation there is no phase, and nothing that was made in one.
+        """
+        if self._limits_n is None or not self.phase:
+            return math.inf
+        return self._limits_n.get(self.phase, 0.0)
+
+    def _has_strayed(self, away_m: float | None) -> bool:
+        """Whether the arm is not where it was sent; where nobody says, nothing is known."""
+        return away_m is not None and not 0.0 <= away_m <= self.divergence_limit_m
 
     def _supervise(self, m: Message) -> Iterator[Finding]:
         reset = m["event"] == "human_reset"
@@ -180,6 +257,9 @@ class WorldView:
         now_stopped, stopping = m["state"] in STOP_STATES, m["event"] in STOPPING
         if m["state"] not in STATES or m["event"] not in EVENTS:
             yield "P7.words", f"No supervisor says {m['event']!r} in {m['state']!r}."
+        elif not self.stopped and not self._leads(m["event"], m["state"]):
+            yield "P7.state", f"In {self._state!r} comes {m['event']!r}, and then {m['state']!r}."
+        self._state = m["state"]
         if stopping and not now_stopped:
             rule = "P7.restart" if m["event"] == "restarted" else "P7.gate"
             yield rule, f"A {m['event']} event leaves {m['state']!r}, not stopped."
@@ -192,6 +272,14 @@ class WorldView:
             self._void("a stop", m["t"], arrivals=0)
         # Whatever it says of itself: only a person clears a stop, and these events are one.
         self.stopped = now_stopped or stopping or (self.stopped and not reset)
+
+    def _leads(self, event: str, state: str) -> bool:
+        """Whether an event of a supervisor that stops nobody leads to this state."""
+        if event in STOPPING:
+            return True  # a violation of its own, where it does not stop (P7.gate)
+        if event == "watchdog":
+            return (self._state, state) == ("run", "watchdog_hold")
+        return state == "run" and (event == "human_reset" or self._state == "watchdog_hold")
 
     def _void(self, cause: str, before_ns: int, arrivals: int | None = None) -> None:
         """What was seen before an event is void, and what had arrived when it happened."""

@@ -202,7 +202,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
         )
         projected = Projected(Proposal(made.metadata, made.actions, "first"), made.actions, 0, 0)
         return admission.Admitted(
-            projected=projected, verdict=Verdict(layers, {}, (0, 16)), context=None,
+            projected=projected, verdict=Verdict(layers, {}, (0, 16)), context=rig.context(),
             seal=admission._SEAL,
         )  # fmt: skip
 

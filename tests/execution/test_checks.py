@@ -11,6 +11,7 @@ from genpolicy.execution.moment import FALLBACK, Chunk, ExecutorMode, Moment, Vi
 from genpolicy.execution.nanoseconds import ChunkTimes
 
 MS = 1_000_000
+UPRIGHT = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 METADATA = ChunkMetadata(
     chunk_id="a", condition_observation_event_time_s=0.1, policy_checkpoint_hash="w",
     sampler_config_hash="s", action_start_time_s=0.2, action_period_s=0.05, valid_until_s=0.6,
@@ -19,13 +20,14 @@ METADATA = ChunkMetadata(
 )  # fmt: skip
 CHUNK = Chunk(
     METADATA, ChunkTimes.of(METADATA), arrival=3, rows=16, checked_rows=(0, 16), passed=True,
-    hashed=True,
+    hashed=True, scene={"post": (0.5, *UPRIGHT)},
 )  # fmt: skip
 VIEW = View(
     phase="approach", calibration_epoch="e", newest_observation_ns=150 * MS,
     maximum_age_ns=300 * MS, latest_first_row=15, checkpoint="w", sampler="s", fallback="f",
     session_epoch=1,
     execution_horizon=8, period_ns=50 * MS, controller="m", controller_mode="m",
+    divergence_limit_m=0.05, scene={"post": (0.52, *UPRIGHT)}, scene_limit_m=0.02 + 1e-12,
 )  # fmt: skip
 GOOD = Moment(
     now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, issued=True, same_action=True,
@@ -33,6 +35,7 @@ GOOD = Moment(
     last_accept_ns=260 * MS, follows=True,
     accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
     queued_start_ns=200 * MS, newer_start_ns=350 * MS, waiting=1, capacity=2,
+    divergence_m=0.05,
 )  # fmt: skip
 
 
@@ -95,6 +98,8 @@ BAD = {
     "sequence": replace(GOOD, last_sequence=5),
     "continuity": replace(GOOD, follows=False),
     "pace": replace(GOOD, last_accept_ns=265 * MS + 1),
+    "divergence": replace(GOOD, divergence_m=0.0501),
+    "scene": view(scene={"post": (0.5201, *UPRIGHT)}),
     "watchdog": replace(GOOD, last_accept_ns=210 * MS - 1),
 }
 
@@ -135,7 +140,7 @@ def test_what_is_unknown_does_not_hold():
     assert failing(unknown) >= {
         "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
         "checked_rows", "future_observation", "stale_observation", "sequence", "period",
-        "continuity", "late_chunk",
+        "continuity", "late_chunk", "scene",
     }  # fmt: skip
 
 

@@ -35,11 +35,13 @@ def told_apart(rig, first=0.0):
     def some(*shape):
         return np.array([next(numbers) for _ in range(math.prod(shape))]).reshape(shape)
 
-    body = (some(3), some(4))
+    place, turn = some(3), some(4)
+    rig.poses = {"post": (place, turn / np.linalg.norm(turn))}
+    rig.executor.see(rig.now_s, rig.poses)
     return StandInContext(
         q_cmd=some(JOINTS), q_cmd_history=some(2, JOINTS), q_meas=some(JOINTS),
         dq_meas=some(JOINTS), measured_at_s=rig.now_s - 0.01,
-        last_action=rig.context().last_action, scene=StandInScene({"post": body}),
+        last_action=rig.context().last_action, scene=StandInScene(rig.poses),
     )  # fmt: skip
 
 
@@ -175,7 +177,7 @@ def told_to_the_journal(rig):
         rig.now_s, chunk_id="x", method="flow", index=2, layers={"representation": True},
         first_reason="workspace", measures={"votes": 3},
     )  # fmt: skip
-    rig.journal.scene(rig.now_s, {"post": ((0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0))})
+    rig.see(post=0.1)
     rig.executor.end_invocation(rig.now_s, "i-1", "answered")
 
 

@@ -1,12 +1,14 @@
 """Reading an observation never raises; what it does not say is not allowed."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
+from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.moment import View
-from genpolicy.execution.observed import Observed, too_far
+from genpolicy.execution.observed import FARTHEST_M, Observed, distance_of
 
 NOW_NS = 10**9
 
@@ -14,8 +16,8 @@ NOW_NS = 10**9
 EMPTY = View()
 
 
-def read(event_time_s, phase="approach", epoch="e", view=EMPTY):
-    return Observed.of(view, NOW_NS, event_time_s, phase, epoch)
+def read(event_time_s, phase="approach", epoch="e", view=EMPTY, divergence_m=None):
+    return Observed.of(view, NOW_NS, event_time_s, phase, epoch, divergence_m)
 
 
 def test_what_is_said_is_kept():
@@ -23,8 +25,9 @@ def test_what_is_said_is_kept():
     assert told == Observed(900_000_000, "approach", "e", "")
     assert told.payload() == {
         "event_time_ns": 900_000_000, "phase": "approach", "calibration_epoch": "e", "used": True,
-        "ignored_because": "",
+        "ignored_because": "", "divergence_m": None,
     }  # fmt: skip
+    assert read(0.9, divergence_m=0.02).payload()["divergence_m"] == 0.02
 
 
 @pytest.mark.parametrize("time_s", [math.nan, math.inf, None, "0.9", 1e300, 1.0 + 1e-9])
@@ -45,9 +48,30 @@ def test_what_is_no_name_names_nothing(name):
     assert (told.phase, told.calibration_epoch) == ("", "")
 
 
-def test_a_distance_is_within_its_limit_or_too_far():
-    assert not too_far(None, 0.05)
-    for near in (0.0, 0, 0.05, np.float32(0.01)):
-        assert not too_far(near, 0.05)
-    for far in (math.nextafter(0.05, 1.0), -1e-9, math.nan, math.inf, -math.inf, "0.01", 1j, [0.0]):
-        assert too_far(far, 0.05)
+def test_a_distance_is_a_number_that_any_file_can_hold():
+    """None where nobody says; what is none of a distance is the largest that there is."""
+    assert distance_of(None) is None and distance_of(np.float32(0.25)) == 0.25
+    for none in (-1e-9, math.nan, math.inf, -math.inf, "0.01", 1j, [0.0], 10**400):
+        assert distance_of(none) == FARTHEST_M
+    assert type(distance_of(0)) is float and json.dumps(FARTHEST_M, allow_nan=False)
+
+
+@pytest.mark.parametrize("near", [None, 0.0, 0, 0.05, np.float32(0.01)])
+def test_a_distance_within_its_limit_voids_nothing(near):
+    assert _accepted_after(near) == 2
+
+
+@pytest.mark.parametrize(
+    "far", [math.nextafter(0.05, 1.0), -1e-9, math.nan, math.inf, -math.inf, "0.01", 1j, [0.0]]
+)
+def test_a_distance_beyond_it_or_none_voids_what_was_made_before(far):
+    assert _accepted_after(far) == 0
+
+
+def _accepted_after(divergence_m):
+    rig = Rig()
+    rig.run(2)
+    rig.observe(divergence_m=divergence_m)
+    before = rig.stub.accepted
+    rig.tick(2)
+    return rig.stub.accepted - before

@@ -38,6 +38,18 @@ def test_force_gate(supervisor, force_n, phase, trips):
     assert supervisor.stopped is trips
 
 
+@pytest.mark.parametrize(("before", "now", "force_n", "trips"), [
+    ("approach", "insert", 30.0, True), ("approach", "insert", 20.0, False),
+    ("insert", "approach", 30.0, True), ("insert", "insert", 30.0, False),
+    ("unknown phase", "insert", 1.0, True), ("insert", ["insert"], 1.0, True),
+])  # fmt: skip
+def test_where_the_phase_changed_since_the_smaller_limit_holds(
+    supervisor, before, now, force_n, trips
+):
+    supervisor.observe_force(0.0, 0.0, before)
+    assert supervisor.observe_force(1.0, force_n, now) is trips
+
+
 def test_collision_gate(supervisor):
     assert supervisor.observe_collision(0.0, False) is False and not supervisor.stopped
     assert supervisor.observe_collision(0.1, True) is True and supervisor.stopped

@@ -237,8 +237,11 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         replan_lead_rows=cell.execution.replan_lead_rows,
         late_chunk=cell.execution.late_by_phase,
         force_limit_n=cell.execution.force_limit_n,
+        maximum_divergence_m=cell.execution.maximum_divergence_m,
+        maximum_scene_shift_m=cell.execution.maximum_scene_shift_m,
     )
-    motion = expected_motion(cell.checker.cell, rollouts[0].setup.task.action_at)
+    task = rollouts[0].setup.task
+    motion = expected_motion(cell.checker.cell, task.action_at, task.scene_poses)
     report = check_journal(journal, expected, motion)
     assert not report.violations and report.reproved_actions > 100
 

@@ -21,6 +21,8 @@ EXPECTED = ExpectedSettings(
     replan_lead_rows=EXECUTION.replan_lead_rows,
     late_chunk=EXECUTION.late_by_phase,
     force_limit_n=EXECUTION.force_limit_n,
+    maximum_divergence_m=EXECUTION.maximum_divergence_m,
+    maximum_scene_shift_m=EXECUTION.maximum_scene_shift_m,
 )
 
 

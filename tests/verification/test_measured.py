@@ -15,9 +15,9 @@ SEEN = np.array([[9.0, *POSE]] * 2)
 RATES = np.array([2.0, 2.0, 2.0, 0.2])
 
 
-def robot(seen=lambda row: row[1:]):
+def robot(seen=lambda row: row[1:], placed=None):
     """An arm that stands upright, its TCP at the first three joints; the last turns slowly."""
-    expected = SimpleNamespace(arm_rates=np.stack([RATES, RATES]), seen=seen)
+    expected = SimpleNamespace(arm_rates=np.stack([RATES, RATES]), seen=seen, placed=placed)
     return SimpleNamespace(forward=lambda q_rad: (q_rad[:3], np.eye(3)), expected=expected)
 
 
@@ -126,3 +126,46 @@ def test_without_a_robot_joints_and_tcp_are_not_held_together():
 
 def test_who_does_not_say_where_the_tcp_is_seen_is_not_asked():
     assert rules(*BOTH, saw(50, SEEN + 1.0), proof=robot(seen=None)) == []
+
+
+@pytest.mark.parametrize(("told_m", "found"), [
+    (0.3, []), (0.3000015, []), (0.29999, ["state.divergence"]), (None, ["state.divergence"]),
+])  # fmt: skip
+def test_how_far_the_arm_is_off_lies_between_state_and_command(told_m, found):
+    action = np.array([0.1, 0.2, 0.6, *COLUMNS, 0.01], dtype="<f8").tobytes().hex()
+    looks = [
+        ("observation", {"t": t * MS, "divergence_m": away_m})
+        for t, away_m in ((0, None), (50, told_m))
+    ]
+    journal = [SESSION, state(0), looks[0], ("accept", {"t": 0, "action": action}), state(50),
+               looks[1]]  # fmt: skip
+    view = Measured(robot())
+    assert [rule for kind, m in journal for rule, _ in view.follow(kind, m)] == found
+
+
+@pytest.mark.parametrize(("velocity", "found"), [
+    ([0.2, 0.0, 0.0, 0.0], []), ([0.20003, 0.0, 0.0, 0.0], []),
+    ([0.2001, 0.0, 0.0, 0.0], ["state.velocity"]), (None, ["state.velocity"]),
+])  # fmt: skip
+def test_a_chunk_is_checked_at_the_velocity_that_the_states_have(velocity, found):
+    session = ("session", {**SESSION[1], "period_ns": 50 * MS})
+    kind, chunk = queued(50, (0.11, 0.2, 0.3, 0.4))
+    told = None if velocity is None else np.array(velocity, "<f8").tobytes().hex()
+    chunk["motion"]["dq_meas_rad_s"] = told
+    view = Measured(robot())
+    journal = [session, at(0, 0.1), at(50, 0.11), (kind, chunk)]
+    assert [rule for own, m in journal for rule, _ in view.follow(own, m)] == found
+
+
+@pytest.mark.parametrize(("bodies", "found"), [
+    ({"post": [9.0] * 7}, []), ({"post": [9.0] * 6 + [9.01]}, ["state.scene"]),
+    ({}, ["state.scene"]), ({"box": [9.0] * 7}, ["state.scene"]),
+])  # fmt: skip
+def test_the_scene_on_record_is_the_one_that_was_seen(bodies, found):
+    """What is seen has the place of the post in its first number, seven times."""
+    told = {name: np.array(pose, "<f8").tobytes().hex() for name, pose in bodies.items()}
+    shown = lambda row: {"post": (row[[0, 0, 0]], row[[0, 0, 0, 0]])}  # noqa: E731
+    view = Measured(robot(placed=shown))
+    journal = [SESSION, state(0), ("scene", {"t": 0, "bodies": told}), exposed(0), there(0),
+               saw(0, SEEN[:1])]  # fmt: skip
+    assert [rule for kind, m in journal for rule, _ in view.follow(kind, m)] == found

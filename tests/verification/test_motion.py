@@ -79,7 +79,7 @@ def moved(poses):
             q_cmd=path[3], q_cmd_history=path[:3], q_meas=path[3], dq_meas=step_rad / PERIOD_S,
             last_action=actions[3], scene=scene,
         )  # fmt: skip
-        rig.journal.scene(0.0, scene.bodies)
+        rig.executor.see(0.0, scene.bodies)
         verdict = replace(passing_verdict(), q_rad=path[4:])
         rig.run(actions=actions[4:], verdict=verdict, context=context)
         told = [(e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload})

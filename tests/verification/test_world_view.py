@@ -1,36 +1,46 @@
 """The checker's own picture of the present: each objection alone, and stops that stay."""
 
+import numpy as np
 import pytest
 
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.world_view import WorldView
 
 MS = 1_000_000
-SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
+SETTINGS = {
+    "maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m", "fallback_hash": "f",
+    "maximum_divergence_m": 0.05, "maximum_scene_shift_m": 0.02,
+}  # fmt: skip
 EXPECTED = ExpectedSettings(
     execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
     controller_mode="m", replan_lead_rows=3, late_chunk={},
-    force_limit_n={"approach": 20.0, "insert": 40.0},
+    force_limit_n={"approach": 20.0, "insert": 40.0}, maximum_divergence_m=0.05,
+    maximum_scene_shift_m=0.02,
 )  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
-    "arrival": 0,
+    "arrival": 0, "motion": None,
 }  # fmt: skip
 
 
-def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None):
+def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None, away_m=None):
     event_ms = t_ms if event_ms is None else event_ms
-    return list(view.follow("observation", {
+    said = list(view.follow("observation", {
         "t": t_ms * MS, "event_time_ns": event_ms * MS, "used": used, "phase": phase,
-        "calibration_epoch": epoch,
+        "calibration_epoch": epoch, "divergence_m": away_m,
+        "ignored_because": "" if used else "older",
     }))  # fmt: skip
+    for kind, (old, new, event_ns) in list(view._changes.items()):
+        noted = {"old": old, "new": new, "event_time_ns": event_ns, "t": t_ms * MS}
+        assert list(view.follow(kind, noted)) == []
+    return said
 
 
 @pytest.fixture
 def view():
     made = WorldView()
-    made.fallback_hash = "f"
+    made.declare(SETTINGS)
     assert list(made.follow("active", {"checkpoint": "w", "sampler": "s"})) == []
     assert list(made.follow("controller", {"mode": "m", "t": 0})) == []
     assert observed(made, 1000) == []
@@ -177,15 +187,104 @@ def test_a_supervisor_has_few_words(view, event, state):
     assert [rule for rule, _ in view.follow("supervisor", message)] == ["P7.words"]
 
 
-@pytest.mark.parametrize(("felt_n", "found"), [(40.0, []), (40.01, ["P7.force"])])
-def test_above_the_force_that_any_phase_bears_nothing_is_accepted(felt_n, found):
-    """A supervisor that is deaf says nothing; what was measured does."""
+@pytest.mark.parametrize(("felt_n", "found"), [(20.0, []), (20.01, ["P7.force"])])
+def test_above_the_force_that_its_phase_bears_nothing_is_accepted(felt_n, found):
+    """A supervisor that is deaf says nothing; what was measured does. Another phase bears 40 N."""
     own, known = WorldView(EXPECTED), WorldView()
     for view in (own, known):
-        view.fallback_hash = "f"
+        view.declare(SETTINGS)
         list(view.follow("active", {"checkpoint": "w", "sampler": "s"}))
         list(view.follow("controller", {"mode": "m", "t": 0}))
         observed(view, 1000)
         assert list(view.follow("state", {"force_n": felt_n, "t": 1000 * MS})) == []
     assert rules(own) == found and rules(known) == []
     assert list(own.follow("state", {"force_n": 1.0, "t": 1050 * MS})) == [] and rules(own) == []
+
+
+@pytest.mark.parametrize(("away_m", "found"), [
+    (None, []), (0.05, []), (0.0501, ["P1.void"]), (-1.0, ["P1.void"]), (1.8e308, ["P1.void"]),
+])  # fmt: skip
+def test_a_divergence_voids_what_was_seen_before_though_nobody_heeds_it(view, away_m, found):
+    """An executor that compares with nothing says nothing; what was measured does."""
+    assert observed(view, 1050, away_m=away_m) == []
+    assert rules(view) == found and rules(view, condition_ns=1050 * MS, arrival=1) == []
+
+
+def test_a_divergence_of_what_is_not_used_voids_what_was_seen_before_it_came(view):
+    assert observed(view, 1100, event_ms=900, used=False, away_m=0.2) == []
+    assert rules(view) == ["P1.void"]
+
+
+@pytest.mark.parametrize(("away_m", "found"), [(0.04, ["journal.divergence"]), (0.06, [])])
+def test_a_divergence_that_nobody_observed_is_none(view, away_m, found):
+    observed(view, 1050, away_m=away_m)
+    noted = {"reason": "observation_divergence", "before_ns": 1050 * MS, "t": 1050 * MS}
+    assert [rule for rule, _ in view.follow("invalidate", noted)] == found
+
+
+@pytest.mark.parametrize(("before", "now", "felt_n", "found"), [
+    ("approach", "insert", 30.0, ["P7.force"]), ("insert", "approach", 30.0, ["P7.force"]),
+    ("insert", "insert", 30.0, []), ("insert", "insert", 40.01, ["P7.force"]),
+    ("approach", "insert", 20.0, []), ("insert", "unknown", 1.0, ["P7.force"]),
+])  # fmt: skip
+def test_where_the_phase_changed_meanwhile_the_smaller_limit_holds(before, now, felt_n, found):
+    view = WorldView(EXPECTED)
+    view.declare(SETTINGS)
+    observed(view, 1000, phase=before)
+    assert list(view.follow("state", {"force_n": felt_n, "t": 1050 * MS})) == []
+    observed(view, 1050, phase=now)
+    assert [rule for rule in rules(view, t_ms=1050) if rule == "P7.force"] == found
+    assert list(view.follow("state", {"force_n": felt_n, "t": 1100 * MS})) == []
+    observed(view, 1100, phase=now)  # felt in this phase from the begin on
+    limit_n = {"approach": 20.0, "insert": 40.0}.get(now, 0.0)
+    assert ("P7.force" in rules(view, t_ms=1100)) == (felt_n > limit_n)
+
+
+def stands(x_m, y_m=0.0):
+    return {"post": np.array([x_m, y_m, 0.1, 1.0, 0.0, 0.0, 0.0], "<f8").tobytes().hex()}
+
+
+@pytest.mark.parametrize(("checked", "found"), [
+    (stands(0.5), []), (stands(0.51), []), (stands(0.5, 0.021), ["P1.scene"]), ({}, ["P1.scene"]),
+    ({"fixture": stands(0.5)["post"]}, ["P1.scene"]),
+])  # fmt: skip
+def test_a_chunk_that_was_checked_in_another_scene_than_the_one_seen_is_found(view, checked, found):
+    assert list(view.follow("scene", {"bodies": stands(0.5)})) == []
+    assert rules(view, motion={"scene": checked}) == found
+    assert list(view.follow("scene", {"bodies": {"": ""}})) == []
+    assert rules(view, motion={"scene": checked}) == ["P1.scene"]
+
+
+def test_a_change_that_nobody_notes_or_notes_otherwise_is_found(view):
+    said = {"t": 1100 * MS, "event_time_ns": 1100 * MS, "used": True, "phase": "insert",
+            "calibration_epoch": "e1", "divergence_m": None, "ignored_because": ""}  # fmt: skip
+    assert list(view.follow("observation", said)) == []
+    ((rule, _),) = view.follow("scene", {"bodies": {}})
+    assert rule == "journal.phase" and list(view.follow("scene", {"bodies": {}})) == []
+    assert list(view.follow("observation", said | {"phase": "approach"})) == []
+    noted = {"old": "align", "new": "approach", "event_time_ns": 1100 * MS}
+    ((rule, _),) = view.follow("phase", noted)
+    assert rule == "journal.phase"
+
+
+@pytest.mark.parametrize(("events", "found"), [
+    ([("watchdog", "watchdog_hold"), ("watchdog_recovered", "run")], []),
+    ([("watchdog_recovered", "run")], ["P7.state"]), ([("watchdog", "run")], ["P7.state"]),
+    ([("watchdog", "watchdog_hold"), ("watchdog", "watchdog_hold")], ["P7.state"]),
+    ([("human_reset", "watchdog_hold")], ["P7.state"]), ([("human_reset", "run")], []),
+])  # fmt: skip
+def test_a_supervisor_goes_from_state_to_state(view, events, found):
+    told = [{"event": event, "state": state, "detail": "Ann", "t": 1100 * MS}
+            for event, state in events]  # fmt: skip
+    assert [rule for m in told for rule, _ in view.follow("supervisor", m)] == found
+
+
+@pytest.mark.parametrize(("steps", "found"), [
+    ([("hold", "retreat", 0), ("retreat", "hold", 1), ("retreat", "abort", 2)], []),
+    ([("retreat", "hold", 0)], ["P8.failures"]), ([("hold", "retreat", 1)], ["P8.failures"]),
+    ([("retreat", "abort", 1), ("abort", "stopped", 1), ("stopped", "idle", 0)], []),
+    ([("retreat", "abort", 1), ("abort", "idle", 1)], ["P8.failures"]),
+])  # fmt: skip
+def test_failed_primitives_are_counted(view, steps, found):
+    told = [{"old": old, "new": new, "failures": count, "cause": ""} for old, new, count in steps]
+    assert [rule for m in told for rule, _ in view.follow("recovery", m)] == found

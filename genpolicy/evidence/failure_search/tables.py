@@ -104,7 +104,7 @@ def write_searches(
     period_s = comparison.cell.horizons.action_period_s
     robot = cell_of(task, comparison.feasibility, action_period_s=period_s)
     journals = [searching.shard.journal for searching in searches]
-    checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
+    checked = checker_document(journals, cell=comparison.cell, robot=robot, task=task)
     CHECKER.write(folder, checked)
 
 

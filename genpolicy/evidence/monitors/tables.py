@@ -78,7 +78,7 @@ def write_monitors(
         action_period_s=comparison.cell.horizons.action_period_s,
     )
     journals = [shard.journal for shard in (*thresholds, *shards)]
-    checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
+    checked = checker_document(journals, cell=comparison.cell, robot=robot, task=task)
     CHECKER.write(folder, checked)
 
 

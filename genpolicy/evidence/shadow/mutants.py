@@ -10,6 +10,7 @@ actions through, or the second look is none. The chunks are imitations, so both 
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -55,7 +56,7 @@ def slipped_by(check: Check, table: Checks) -> int:
 
     Beyond those that pass both; 0 for a check that one of them asks alone.
     """
-    if Place.STUB not in check.places or not check.places - {Place.STUB, Place.LAYER}:
+    if not asked_twice(check):
         return 0
     blind = without(table, check.name)
     by_both = _played(check.name, table).stub.accepted
@@ -64,6 +65,12 @@ def slipped_by(check: Check, table: Checks) -> int:
         _played(check.name, table, stub_checks=blind),
     )
     return sum(max(0, rig.stub.accepted - by_both) for rig in alone)
+
+
+def asked_twice(check: Check) -> bool:
+    """Executor and stub both ask it."""
+    both = Place.STUB in check.places and bool(check.places - {Place.STUB, Place.LAYER})
+    return both or Place.OBSERVED in check.places
 
 
 def _played(check: str, checks: Checks, *, stub_checks: Checks | None = None) -> Rig:
@@ -267,6 +274,14 @@ def _diverged(rig: Rig) -> None:
     rig.observe(divergence_m=0.2)
 
 
+def _a_body_moves(rig: Rig) -> None:
+    """A chunk is checked with a post that is then seen elsewhere."""
+    rig.see(post=0.5)
+    _begin(rig)
+    rig.see(post=0.5 + 2 * rig.cell.execution.maximum_scene_shift_m)
+    rig.tick(2)
+
+
 def _offered(*, sequence: int, altered: bool) -> Scenario:
     """The second row comes to the stub past the executor."""
 
@@ -302,6 +317,7 @@ SCENARIOS: dict[str, Scenario] = {
     "controller_mode": _new_chunk_in_another_mode,
     "commander": _then(lambda rig: rig.executor.begin_fallback(rig.now_s)),
     "duplicate": _same_chunk_twice,
+    "divergence": _then(_diverged),
     "early": _starts_later,
     "end_of_episode": _after_the_end,
     "execution_horizon": _whole_chunk,
@@ -313,9 +329,10 @@ SCENARIOS: dict[str, Scenario] = {
     "out_of_order": _one_window_twice,
     "pace": _two_at_once,
     "period": _bad(action_period_s=0.1),
-    "issued": _bad(context=None),
+    "issued": _bad(verdict=replace(passing_verdict(), q_rad=cast(Any, None))),
     "phase_transition": _bad(task_phase="insert"),
     "predecessor": _bad(predecessor_chunk_id="never seen"),
+    "scene": _a_body_moves,
     "same_action": _offered(sequence=2, altered=True),
     "queue_overflow": _three_in_a_row,
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),

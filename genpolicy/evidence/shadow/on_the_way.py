@@ -6,14 +6,20 @@ copy, an older one behind a newer one, one that never comes behind one that came
 executed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.execution.executor import Executor
+from genpolicy.execution.informed import UNKNOWN
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.supervisor import Supervisor
+
+Array = NDArray[np.float64]
 
 SUFFIX = "_on_the_way"
 """Ends the names of the fixtures; their chunks are those of `held_out`."""
@@ -30,6 +36,7 @@ class Way:
         supervisor: Its supervisor.
         journal: Its journal.
         item: The observation that the chunk was made from.
+        poses: Where bodies were seen in it.
         checkpoint: Weights in force.
         sampler: Sampler settings in force.
         now_s: When the chunk arrives, s.
@@ -39,6 +46,7 @@ class Way:
     supervisor: Supervisor
     journal: Journal
     item: Observation
+    poses: Mapping[str, tuple[Array, Array]]
     checkpoint: str
     sampler: str
     now_s: float
@@ -86,6 +94,13 @@ def _pushed_away(way: Way) -> None:
     way.look(divergence_m=2 * way.executor.cell.execution.maximum_divergence_m)
 
 
+def _a_body_moved(way: Way) -> None:
+    """Every body is seen elsewhere; of a task without any, a scene that cannot be read."""
+    aside_m = np.array([0.0, 2 * way.executor.cell.execution.maximum_scene_shift_m, 0.0])
+    seen = {name: (np.asarray(at) + aside_m, turn) for name, (at, turn) in way.poses.items()}
+    way.executor.see(way.now_s, seen or UNKNOWN)
+
+
 def _force(way: Way) -> None:
     """A force above the limit of the phase, or of every phase if the task names no such one."""
     limits = way.executor.cell.execution.force_limit_n
@@ -120,6 +135,7 @@ HAPPENED: tuple[tuple[str, DiscardReason, Callable[[Way], object]], ...] = (
     ("phase_change", DiscardReason.PHASE_TRANSITION, _another_phase),
     ("calibration_change", DiscardReason.CALIBRATION_MISMATCH, _another_calibration),
     ("divergence", DiscardReason.OBSERVATION_DIVERGENCE, _pushed_away),
+    ("moved_body", DiscardReason.OBSERVATION_DIVERGENCE, _a_body_moved),
     ("force_event", DiscardReason.FORCE_EVENT, lambda w: w.executor.force_event(w.now_s)),
     ("collision_event", DiscardReason.COLLISION_EVENT,
      lambda w: w.executor.collision_event(w.now_s)),

@@ -153,6 +153,7 @@ class Rig:
         self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"
+        self.poses: dict[str, tuple[Array, Array]] = {}
         self.made = 0
         self.executor.set_active(self.now_s, CHECKPOINT, SAMPLER)
         self.executor.controller(self.now_s, self.cell.controller_mode)
@@ -166,6 +167,12 @@ class Rig:
         """Hand over an observation of this age, in the rig's phase and epoch."""
         event_time_s = self.now_s - age_s
         return self.executor.observe(self.now_s, event_time_s, self.phase, self.epoch, divergence_m)
+
+    def see(self, **places_m: float) -> None:
+        """The bodies of the scene are seen upright, each so far along one axis, m."""
+        upright = np.array([1.0, 0.0, 0.0, 0.0])
+        self.poses = {name: (np.array([x, 0.0, 0.0]), upright) for name, x in places_m.items()}
+        self.executor.see(self.now_s, self.poses)
 
     def chunk(self, **changes: Any) -> StandIn:
         """A valid chunk from an observation made now, with changes to what it carries.
@@ -207,11 +214,12 @@ class Rig:
         )
 
     def context(self) -> StandInContext:
-        """What an honest chunk would have been checked against now: the last command."""
+        """What an honest chunk would have been checked against now: last command and scene."""
         commanded = self.journal.last("accept", "fallback")
+        seen = StandInContext(scene=StandInScene(dict(self.poses)))
         if commanded is None:
-            return StandInContext()
-        return StandInContext(last_action=decode_actions(commanded["action"])[0])
+            return seen
+        return replace(seen, last_action=decode_actions(commanded["action"])[0])
 
     @staticmethod
     def actions(seed: int, rows: int = ROWS) -> Array:

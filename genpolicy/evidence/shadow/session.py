@@ -109,7 +109,7 @@ def play_incident(
         now_s += cell.horizons.action_period_s
     _answer(executor, item, metadata.chunk_id, now_s)
     incident.happen(Way(
-        executor, stub.supervisor, journal, item, context.active_checkpoint_hash,
+        executor, stub.supervisor, journal, item, case.poses, context.active_checkpoint_hash,
         context.active_sampler_hash, now_s,
     ))  # fmt: skip
     first = [] if newer is None else [newer]
@@ -242,7 +242,7 @@ def _begin(
     executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
     executor.controller(0.0, cell.controller_mode)
     executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
-    journal.scene(0.0, case.poses)
+    executor.see(0.0, case.poses)
     return executor, stub, journal
 
 

@@ -19,9 +19,14 @@ TICKS = 3
 
 
 def _force(rig: Rig) -> None:
-    rig.supervisor.observe_force(
-        rig.now_s, 2 * rig.cell.execution.force_limit_n[rig.phase], rig.phase
-    )
+    limits = rig.cell.execution.force_limit_n
+    rig.supervisor.observe_force(rig.now_s, 2 * max(limits.values()), rig.phase)
+
+
+def _force_of_another_phase(rig: Rig) -> None:
+    """A force that only the phase with the largest limit bears."""
+    limits = rig.cell.execution.force_limit_n
+    rig.supervisor.observe_force(rig.now_s, max(limits.values()), rig.phase)
 
 
 def _collision(rig: Rig) -> None:
@@ -55,10 +60,18 @@ class DeafToEmergencyStop(Supervisor):
         """Hears nothing."""
 
 
+class DeafToPhase(Supervisor):
+    """Stops only for a force that no phase bears."""
+
+    def _bears_n(self, phase: str) -> float:
+        return max(self.settings.force_limit_n.values())
+
+
 DEAF: dict[str, tuple[type[Supervisor], Callable[[Rig], None]]] = {
     "force": (DeafToForce, _force),
     "collision": (DeafToCollision, _collision),
     "emergency_stop": (DeafToEmergencyStop, _emergency_stop),
+    "phase": (DeafToPhase, _force_of_another_phase),
 }
 """What stops: the supervisor that is deaf to it, and how it is told."""
 

@@ -1,6 +1,6 @@
 """The shadow evidence as files: candidates, stub, balances, holds, journal, checker and others."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.integrity.rows import write_rows
+from genpolicy.tasks.api import Task
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.report import JournalReport
@@ -112,7 +113,7 @@ def checker_document(
     *,
     cell: Cell,
     robot: FeasibilityCell,
-    seen: Callable[[Array], Array] | None = None,
+    task: Task | None = None,
 ) -> Checked:
     """What the independent checker says of journal files; content of `checker.json`.
 
@@ -123,8 +124,7 @@ def checker_document(
         journals: The files.
         cell: The settings.
         robot: What actions were checked in.
-        seen: The task's `action_at`, where sessions are on the virtual clock and state what was
-            measured.
+        task: The task, where sessions are on the virtual clock and state what was measured.
     """
     horizons, execution = cell.horizons, cell.execution
     expected = ExpectedSettings(
@@ -137,8 +137,10 @@ def checker_document(
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
-    motion = expected_motion(robot, seen)
+    motion = expected_motion(robot, task and task.action_at, task and task.scene_poses)
     return checked(
         {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     )

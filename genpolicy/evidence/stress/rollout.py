@@ -129,7 +129,7 @@ class Rollout:
         self._seen = observation = world.observe()
         self.tally.feel(self.journal, now_s, world.contact_force_n)  # new at the start only
         self._measured.note(now_s, observation)
-        self.journal.scene(now_s, self.setup.task.scene_poses(observation))
+        self.executor.see(now_s, self.setup.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
         self._exposures.expose(now_s, observation, world.phase, world.calibration_epoch)

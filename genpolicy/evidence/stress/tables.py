@@ -103,7 +103,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     task = load_task(comparison.task)
     period_s = comparison.cell.horizons.action_period_s
     robot = cell_of(task, comparison.feasibility, action_period_s=period_s)
-    checked = checker_document(journals, cell=comparison.cell, robot=robot, seen=task.action_at)
+    checked = checker_document(journals, cell=comparison.cell, robot=robot, task=task)
     CHECKER.write(folder, checked)
     _write_envelope(folder, shards)
     write_distilled(folder, [shard.judged for shard in shards])

@@ -4,9 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants, slipped_by
+from genpolicy.evidence.shadow.mutants import (
+    SCENARIOS,
+    asked_twice,
+    play,
+    run_mutants,
+    slipped_by,
+)
 from genpolicy.evidence.shadow.rig import IMITATED, Rig
-from genpolicy.execution.checks import CHECKS, Place, missing, without
+from genpolicy.execution.checks import CHECKS, missing, without
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.verification.checker import check_messages
@@ -25,7 +31,7 @@ def test_every_check_has_a_scenario_and_every_mutant_is_detected():
 
 def test_executor_and_stub_each_keep_out_alone_what_both_ask():
     """What one of the two does not see, the other alone must refuse, exactly once."""
-    twice = [c for c in CHECKS if c.places >= {Place.STUB} and c.places - {Place.STUB, Place.LAYER}]
+    twice = [check for check in CHECKS if asked_twice(check)]
     assert len(twice) > 20
     assert [check.name for check in twice if slipped_by(check, _table(check))] == []
 
@@ -77,6 +83,7 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P7.stop" in rules["stopped"]
     assert rules["controller_mode"] == {"P1.controller"}
     assert rules["issued"] == {"P6.ground"}
+    assert rules["divergence"] == {"P1.void"} and rules["scene"] == {"P1.scene"}
 
 
 def test_a_table_without_a_row_is_declared_and_a_table_with_another_row_too():

@@ -80,6 +80,7 @@ BLIND = {
     "phase_change_on_the_way": ("phase_transition", "after_phase_transition"),
     "calibration_change_on_the_way": ("calibration_mismatch", "after_calibration_mismatch"),
     "divergence_on_the_way": ("after_observation_divergence",),
+    "moved_body_on_the_way": ("scene",),
     "force_event_on_the_way": ("after_force_event",),
     "collision_event_on_the_way": ("after_collision_event",),
     "cleared_stop_on_the_way": ("after_stop",),
@@ -105,10 +106,13 @@ def test_an_executor_that_does_not_look_is_seen(shadow, demonstrated, name, monk
     assert found.account.executed == (name == "copy_on_the_way")
 
 
-@pytest.mark.parametrize("name", DEAF)
+STOPS = [name for name in DEAF if name != "phase"]  # that one is deaf to a smaller force
+
+
+@pytest.mark.parametrize("name", STOPS)
 def test_a_supervisor_that_is_deaf_to_what_stops_is_seen(shadow, demonstrated, name, monkeypatch):
     monkeypatch.setattr(session, "Supervisor", DEAF[name][0])
-    for other in DEAF:
+    for other in STOPS:
         incident = named(other if other == "emergency_stop" else f"{other}_stop")
         found = injected(shadow, demonstrated, incident)
         assert (found.account.executed > 0) == (other == name)

@@ -132,9 +132,12 @@ def check(rollouts, folder, *, execution=EXECUTION):
         replan_lead_rows=execution.replan_lead_rows,
         late_chunk=execution.late_by_phase,
         force_limit_n=execution.force_limit_n,
+        maximum_divergence_m=execution.maximum_divergence_m,
+        maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
     setup = rollouts[0].setup if rollouts else None
-    motion = setup and expected_motion(setup.checker.cell, setup.task.action_at)
+    task = setup and setup.task
+    motion = setup and expected_motion(setup.checker.cell, task.action_at, task.scene_poses)
     return check_journal(path, expected, motion)
 
 
