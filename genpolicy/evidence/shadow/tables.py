@@ -140,7 +140,11 @@ def checker_document(
         maximum_divergence_m=execution.maximum_divergence_m,
         maximum_scene_shift_m=execution.maximum_scene_shift_m,
     )
-    motion = expected_motion(robot, task and task.action_at, task and task.scene_poses)
+    motion = (
+        expected_motion(robot)
+        if task is None
+        else expected_motion(robot, task.action_at, task.scene_poses)
+    )
     return checked(
         {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     )
