@@ -8,9 +8,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
 Scene = Mapping[str, tuple[float, ...]]
 """Bodies by name: x, y, z, m, and a unit quaternion w, x, y, z."""
 

@@ -39,6 +39,7 @@ BELOW = {
     "genpolicy/execution/checks.py",
     "genpolicy/execution/moment.py",
     "genpolicy/execution/nanoseconds.py",
+    "genpolicy/execution/scene.py",
 }
 NOT_CODE_DATA = {".py", ".pyc", ".pyi"}
 

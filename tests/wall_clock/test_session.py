@@ -77,7 +77,7 @@ def test_an_answer_is_executed_from_the_next_tick_on(told):
     assert ask.noise == ("still", "0") and ask.observations.shape == (2, 24)
     told.answer(ask)
     told.decide()
-    assert told.session.stub.accepted == 0 and told.count("scene") == 1
+    assert told.session.stub.accepted == 0 and told.count("scene") == 2  # at first, and at the ask
     told.tick()
     assert told.session.stub.accepted == 1
     told.end()

@@ -16,6 +16,7 @@ from genpolicy.contract.action import GRIPPER, join_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.context import Context
+from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,11 @@ class Case:
     def with_context(self, **changes: object) -> "Case":
         """The case in another context."""
         return replace(self, context=replace(self.context, **changes))  # type: ignore[arg-type]
+
+    def with_body(self, name: str, position_m: Array, quaternion: Array) -> "Case":
+        """The case with a body elsewhere: it stands there, and is checked and seen there."""
+        poses = {**self.poses, name: (position_m, quaternion)}
+        return replace(self, poses=poses).with_context(scene=SceneState(poses))
 
     def later(self, by_s: float) -> "Case":
         """The same from an observation that was made so much later; nothing has moved since."""

@@ -20,7 +20,6 @@ from genpolicy.evidence.shadow import at_the_margin as margin
 from genpolicy.evidence.shadow.case import Case, alone, still
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.cell import Cell
-from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
@@ -210,7 +209,7 @@ def _obstructed(case: Case, checker: FeasibilityChecker, middle: Array) -> Case 
     tip_m = middle[2] - checker.collision.shapes.held_reach_m
     lift_m = max(0.0, tip_m + OVERLAP_M - _top_m(name, position, checker))
     at = np.array([middle[0], middle[1], position[2] + lift_m])
-    return case.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+    return case.with_body(name, at, quaternion)
 
 
 def on_another_surface(case: Case, checker: FeasibilityChecker) -> Case | None:
@@ -223,7 +222,7 @@ def on_another_surface(case: Case, checker: FeasibilityChecker) -> Case | None:
     tip_m = place[2] - checker.collision.shapes.held_reach_m
     height_m = position[2] + tip_m + REST_DEPTH_M - _top_m(name, position, checker)
     at = np.array([place[0], place[1], height_m])
-    there = here.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+    there = here.with_body(name, at, quaternion)
     return alone(checker, [there], "contact_surface")
 
 

@@ -4,9 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from genpolicy.evidence.documents.gallery import GALLERY, Gallery
 from genpolicy.evidence.documents.shadow import (
     CHECKER,
@@ -38,8 +35,6 @@ from genpolicy.tasks.api import Task
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.report import JournalReport
-
-Array = NDArray[np.float64]
 
 
 def write_shadow(
