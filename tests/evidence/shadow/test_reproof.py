@@ -153,7 +153,7 @@ def test_a_scene_that_nobody_saw_is_found(clean, shadow):
 def test_without_a_seen_scene_nothing_is_believed(clean, shadow):
     for message in of_kind(clean, "scene"):
         message["bodies"] = {}
-    assert rules(clean, shadow) == {"P6.scene"}
+    assert rules(clean, shadow) == {"P1.scene", "P6.scene"}
 
 
 def test_a_state_of_after_the_row_is_found(clean, shadow):
