@@ -21,14 +21,17 @@ from gates.report import stage_of
 from gates.settings import read_limits, read_params, read_settings
 
 ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
-SIMPLER = "Next: run the simpler policy that is named above; nothing in the data has to be mended."
+SIMPLER = (
+    "Next: run the simpler policy that the criterion names; nothing in the data has to be mended."
+)
 OPEN = (
-    "Next: record more episodes, to know whether the simpler policy that is named above is enough; "
-    "nothing in the data has to be mended."
+    "Next: record more episodes, to know whether the simpler policy that the criterion names is "
+    "enough; nothing in the data has to be mended."
 )
 NEAR = (
-    "Next: try the simpler policy that is named above: it is about as good as the limit allows, "
-    "more recordings will hardly tell on which side, and nothing in the data has to be mended."
+    "Next: try the simpler policy that the criterion names: it is about as good as the limit "
+    "allows, more recordings will hardly tell on which side, and nothing in the data has to be "
+    "mended."
 )
 SIMPLER_ASKED = frozenset(
     item.id

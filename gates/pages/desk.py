@@ -23,6 +23,8 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
     "E": ("owners_signed", "owners have signed"),
 }
 """The one number of each gate, and what it is a number of."""
+NEXT = "Next: "
+"""How the advice of a gate begins, at the end of its diagnosis."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,8 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
         return Asked(title, report.diagnosis or report.decision, "")
     who = f" ({decided.candidate})" if decided.candidate else ""
     found = f"{decided.question}{who} {_against(decided)}"
-    return Asked(title, f"{found} {_next(decided, report.decision)}", "")
+    said = (found, _next(decided, report.decision), _to_do(report))
+    return Asked(title, " ".join(part for part in said if part), "")
 
 
 def _passes(report: GateReport | None) -> bool:
@@ -209,6 +212,12 @@ def _next(decided: Answer, decision: str) -> str:
     if decided.verdict != "INCONCLUSIVE":
         return decision
     return sentence(decided.caveat.rpartition("; ")[2].removeprefix(f"{INSIDE}: "))
+
+
+def _to_do(report: GateReport) -> str:
+    """What the gate advises to do next; empty where it advises nothing of its own."""
+    _, advised, advice = report.diagnosis.rpartition(NEXT)
+    return f"{NEXT}{advice}" if advised else ""
 
 
 def _box(gate: Gate, report: GateReport | None) -> Box:

@@ -189,7 +189,7 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     [
         (3, "about 1.8 times as many (30 episodes now) show that it holds",
          "record more episodes, to know whether the simpler policy"),
-        (2, f"{HARDLY} (30 episodes now) may not decide", "try the simpler policy that is named"),
+        (2, f"{HARDLY} (30 episodes now) may not decide", "try the simpler policy that"),
     ],
 )  # fmt: skip
 def test_where_it_is_open_whether_a_simpler_policy_does_nobody_is_told_to_take_it(

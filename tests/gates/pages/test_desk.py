@@ -177,6 +177,8 @@ def test_the_asked_box_says_what_was_found_what_is_required_and_what_would_decid
         "diagnosis": "First unmet: remedy_valid_share. Baselines: retrain.",
     })  # fmt: skip
     assert desk_of({"A": stopped}).asked.text == f"{own.question} {said}"
+    advised = stopped.model_copy(update={"diagnosis": "Cause: one. Next: look. Next: try it."})
+    assert desk_of({"A": advised}).asked.text == f"{own.question} {said} Next: try it."
 
 
 def test_watch_it_says_which_way_was_measured_and_which_was_commanded():
