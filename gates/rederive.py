@@ -184,6 +184,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         force_limit_n=execution.force_limit_n,
         maximum_divergence_m=execution.maximum_divergence_m,
         maximum_scene_shift_m=execution.maximum_scene_shift_m,
+        deadline_s=execution.deadline_s,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

@@ -83,7 +83,7 @@ class _Session:
         self.settings: Message = {}
         self.world = WorldView(expected)
         self.balance = Balance()
-        self.invocations = Invocations()
+        self.invocations = Invocations(expected)
         self.joined = Joined()
         self.attended = Attended()
         self.measured = Measured(proof)

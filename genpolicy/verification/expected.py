@@ -28,6 +28,8 @@ class ExpectedSettings:
             before is void.
         maximum_scene_shift_m: How far a body may be seen from where it stood when a chunk was
             checked; beyond it nothing of the chunk may be accepted.
+        deadline_s: An invocation that has not answered so long after the exposure of what it saw
+            is given up at the next tick. A journal does not declare it.
     """
 
     execution_horizon: int
@@ -41,6 +43,7 @@ class ExpectedSettings:
     force_limit_n: dict[str, float]
     maximum_divergence_m: float
     maximum_scene_shift_m: float
+    deadline_s: float
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""

@@ -2,7 +2,9 @@
 
 An invocation states how long it takes, and each check of another candidate what that takes. An
 answer that is judged sooner than stated, or after fewer checks than candidates, would be faster on
-paper than any policy is. That the stated times are those of the latency model is not asked here.
+paper than any policy is. One that has not come when its deadline is over is given up at that tick:
+called answered, it would be a miss that nobody counts. That the stated times are those of the
+latency model is not asked here.
 A policy in a process of its own that failed has no answer: its kind of fault is of a closed list,
 the deadline is missed with it, and nothing of it is judged.
 A session of a rollout (its labels name the start) has a clock, and states every time; one of the
@@ -13,12 +15,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from genpolicy.verification.arrived import TIMED, Arrived
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
 from genpolicy.verification.terms import Terms
 
 Finding = tuple[str, str]
 ROUNDING_NS = 1_000
 """Sums of seconds are rounded to nanoseconds of a tick."""
+TICK_ROUNDING_NS = 2
+"""A time of a tick is rounded to ns, and so is that of an exposure."""
 UNCHECKED = "reject_candidate"
 """What a journal calls a candidate that was refused because its check took too long."""
 GOES_ON = "continue"
@@ -27,7 +32,8 @@ FAULTS = (
     "nonfinite", "gone",
 )  # fmt: skip
 """How a policy in a process of its own can fail."""
-MISSED = ("deadline", "overrun")
+DEADLINE, ANSWERED = "deadline", "answered"
+MISSED = (DEADLINE, "overrun")
 """How an invocation ends that was not answered in time."""
 
 
@@ -48,9 +54,14 @@ class _Invocation:
 
 
 class Invocations:
-    """Follows the invocations of one session."""
+    """Follows the invocations of one session.
 
-    def __init__(self) -> None:
+    Args:
+        expected: Whose deadline they are held to; None: to none.
+    """
+
+    def __init__(self, expected: ExpectedSettings | None = None) -> None:
+        self._expected = expected
         self._of: dict[str, _Invocation] = {}
         self._arrived = Arrived()
         self._terms = Terms()
@@ -119,9 +130,26 @@ class Invocations:
                 yield "clock.fault", f"{m['id']!r} failed, and had been judged or failed before."
             own.failed, self._failing = True, m["id"]
         else:
-            own.answered |= m["detail"] == "answered"
+            own.answered |= m["detail"] == ANSWERED
             if own.failed and own.answered:
                 yield "clock.fault", f"{m['id']!r} failed, and is answered."
+            yield from self._in_time(own, m)
+
+    def _in_time(self, own: _Invocation, m: Message) -> Iterator[Finding]:
+        """Given up at the first tick at which its deadline is over, and not before."""
+        if self._expected is None:
+            return
+        expected = self._expected
+        most_ns = round(expected.deadline_s * 1e9) - TICK_ROUNDING_NS
+        waited_ns, period_ns = m["t"] - own.exposed_ns, round(expected.action_period_s * 1e9)
+        told = f"{m['id']!r} ends after {waited_ns} ns as {m['detail']}"
+        if m["detail"] == DEADLINE and not waited_ns >= most_ns:
+            yield "clock.deadline", f"{told}, and may take {expected.deadline_s:g} s."
+        if m["detail"] == ANSWERED and waited_ns - period_ns >= most_ns:
+            yield (
+                "clock.deadline",
+                f"{told}: its {expected.deadline_s:g} s were over a tick before.",
+            )
 
     def _candidate(self, m: Message) -> Iterator[Finding]:
         which, own = f"Candidate {m['index']} of {m['chunk_id']!r}", self._of.get(m["chunk_id"])

@@ -239,6 +239,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         force_limit_n=cell.execution.force_limit_n,
         maximum_divergence_m=cell.execution.maximum_divergence_m,
         maximum_scene_shift_m=cell.execution.maximum_scene_shift_m,
+        deadline_s=cell.execution.deadline_s,
     )
     task = rollouts[0].setup.task
     motion = expected_motion(cell.checker.cell, task.action_at, task.scene_poses)

@@ -23,6 +23,7 @@ EXPECTED = ExpectedSettings(
     force_limit_n=EXECUTION.force_limit_n,
     maximum_divergence_m=EXECUTION.maximum_divergence_m,
     maximum_scene_shift_m=EXECUTION.maximum_scene_shift_m,
+    deadline_s=EXECUTION.deadline_s,
 )
 
 

@@ -1,10 +1,12 @@
 """The virtual clock's debts: nothing is judged before its time; each further candidate costs."""
 
 import hashlib
+from dataclasses import replace
 
 import pytest
 
 from genpolicy.candidates.wire.faults import Fault
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.invocations import FAULTS, Invocations
 from genpolicy.verification.terms import TERMS
 
@@ -22,6 +24,12 @@ OTHER = ("invocation", {"t": 250 * MS, "id": "b", "stage": "begin", "detail": "0
 END = ("end", {"t": 400 * MS})
 ANSWERED = ("invocation", {"t": 200 * MS, "id": "a", "stage": "end", "detail": "answered"})
 
+EXPECTED = ExpectedSettings(
+    execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.2, queue_capacity=2,
+    controller_mode="m", replan_lead_rows=3, late_chunk={}, force_limit_n={},
+    maximum_divergence_m=0.05, maximum_scene_shift_m=0.02, deadline_s=0.15,
+)  # fmt: skip
+
 SAW = {"t": 101 * MS, "exposed_ns": 100 * MS, "rows": 1, "history": "00" * 8}
 SEEN = [
     ("exposure", {"t": 100 * MS, "sha256": hashlib.sha256(bytes(8)).hexdigest()}),
@@ -36,8 +44,9 @@ def terms_of(begun):
     return {"t": begun["t"], "id": begun["id"], **dict.fromkeys(TERMS, 0.0), **sampled}
 
 
-def rules(*events, session=SESSION):
-    seen = Invocations()
+def rules(*events, session=SESSION, deadline_s=None):
+    held = None if deadline_s is None else replace(EXPECTED, deadline_s=deadline_s)
+    seen = Invocations(held)
     told = [session, *SEEN]
     for event in events:
         told.append(event)
@@ -127,3 +136,22 @@ def test_an_answer_that_comes_behind_the_deadline_is_right_and_a_fallback_owes_n
 def test_what_is_unreadable_is_no_number_of_seconds():
     with pytest.raises(ValueError, match="could not convert"):
         rules(changed(BEGIN, detail="soon"))
+
+
+@pytest.mark.parametrize(("end", "at_ms", "found"), [
+    ("deadline", 250, []), ("deadline", 249, ["clock.deadline"]), ("deadline", 300, []),
+    ("answered", 250, []), ("answered", 299, []), ("answered", 300, ["clock.deadline"]),
+    ("overrun", 200, []), ("overrun", 300, []),
+])  # fmt: skip
+def test_an_invocation_is_given_up_at_the_first_tick_beyond_its_deadline(end, at_ms, found):
+    """Exposed at 100 ms with 150 ms: at the tick of 250 ms it is over, answered between is not."""
+    ended = changed(MISSED, t=at_ms * MS, detail=end)
+    assert rules(BEGIN, ended, deadline_s=0.15) == found
+    assert rules(BEGIN, ended) == []
+
+
+def test_times_of_ticks_are_rounded():
+    assert rules(BEGIN, changed(MISSED, t=250 * MS - 2), deadline_s=0.15) == []
+    late = changed(MISSED, detail="answered", t=300 * MS - 3)
+    assert rules(BEGIN, late, deadline_s=0.15) == []
+    assert rules(BEGIN, changed(late, t=300 * MS - 2), deadline_s=0.15) == ["clock.deadline"]

@@ -15,7 +15,7 @@ EXPECTED = ExpectedSettings(
     execution_horizon=8, action_period_s=0.05, maximum_age_s={}, watchdog_s=0.1, queue_capacity=2,
     controller_mode="m", replan_lead_rows=3, late_chunk={},
     force_limit_n={"approach": 20.0, "insert": 40.0}, maximum_divergence_m=0.05,
-    maximum_scene_shift_m=0.02,
+    maximum_scene_shift_m=0.02, deadline_s=0.15,
 )  # fmt: skip
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",

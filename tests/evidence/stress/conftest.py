@@ -134,6 +134,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         force_limit_n=execution.force_limit_n,
         maximum_divergence_m=execution.maximum_divergence_m,
         maximum_scene_shift_m=execution.maximum_scene_shift_m,
+        deadline_s=execution.deadline_s,
     )
     setup = rollouts[0].setup if rollouts else None
     task = setup and setup.task
