@@ -131,6 +131,12 @@ def counts(path: Path) -> bool:
     return path.is_file() and "__pycache__" not in path.parts and ".tmp." not in path.name
 
 
+def asks_for_the_identity(stage: str) -> bool:
+    """Whether a stage loads a task, or is a gate above one that does and lists none of `task`."""
+    of_a_task = TASK_STAGE in rung(stage)
+    return loads_a_task(stage) or (not of_a_task and any(map(loads_a_task, rung(stage))))
+
+
 def rung(stage: str) -> list[str]:
     """Stages between a gate and the one below it, as `dvc.yaml` lists them; none of another stage.
 
@@ -330,7 +336,7 @@ def rewritten(text: str) -> str:
             at_params, listed = True, set()
         if line == "    deps:":
             at_deps, listed = True, set()
-            if stage != TASK_STAGE and loads_a_task(stage):
+            if stage != TASK_STAGE and asks_for_the_identity(stage):
                 result.append(f"      - {IDENTITY}")
     return "\n".join(result)
 

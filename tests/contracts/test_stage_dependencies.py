@@ -16,10 +16,10 @@ from dependencies import (
     ROOT,
     TABLE,
     TASK_STAGE,
+    asks_for_the_identity,
     code_deps,
     data_files,
     is_code,
-    loads_a_task,
     module_file,
     of_a_plugin,
     pipeline,
@@ -32,6 +32,7 @@ from dependencies import (
 )
 
 from gates.floors import BOUNDS
+from gates.pipeline import RUNGS, names_in
 from gates.preregistration import PREREGISTRATION, asked_by, plan_of
 from gates.proof import SPECS
 from gates.protection import REHEARSAL
@@ -192,6 +193,22 @@ def test_a_gate_judges_again_where_anything_moves_that_it_reads(gate: str) -> No
 
 
 @pytest.mark.parametrize("gate", GATES)
+def test_a_gate_judges_again_where_a_stage_under_it_may_have_run_again(gate: str) -> None:
+    """Its report binds their recorded runs: one from another input to the same bytes refuses it."""
+    own = pipeline()[stage_of(gate)]
+    read, listed = set(names_in(own["deps"])), set(names_in(own["params"]))
+    for stage in RUNGS[gate]:
+        below = pipeline()[stage]
+        missing = [path for path in names_in(below.get("deps")) if not _within(path, read, "/")]
+        missing += [key for key in names_in(below.get("params")) if not _within(key, listed, ".")]
+        assert not missing, f"add to {stage_of(gate)} in dvc.yaml, as of {stage}: {missing}"
+
+
+def _within(name: str, listed: set[str], sign: str) -> bool:
+    return name in listed or any(name.startswith(other + sign) for other in listed)
+
+
+@pytest.mark.parametrize("gate", GATES)
 def test_a_gate_that_says_what_moved_since_the_plan_depends_on_it(gate: str) -> None:
     assert PREREGISTRATION in pipeline()[stage_of(gate)]["deps"]
 
@@ -227,7 +244,7 @@ def test_the_walk_sees_indirect_imports_packages_and_data() -> None:
 @pytest.mark.parametrize("stage", stage_names())
 def test_a_stage_that_loads_a_task_depends_on_its_identity_not_on_its_files(stage: str) -> None:
     deps = pipeline()[stage]["deps"]
-    assert (IDENTITY in deps) == (loads_a_task(stage) and stage != TASK_STAGE)
+    assert (IDENTITY in deps) == (asks_for_the_identity(stage) and stage != TASK_STAGE)
     plugin_files = {module_file(plugin) for plugin in plugins()}
     assert uncovered(plugin_files, deps) == sorted(plugin_files)
 
