@@ -185,7 +185,8 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
         return Asked(title, report.diagnosis or report.decision, "")
     who = f" ({decided.candidate})" if decided.candidate else ""
     found = f"{decided.question}{who} {_against(decided)}"
-    said = (found, _next(decided, report.decision), _to_do(report))
+    undecided = decided.verdict == "INCONCLUSIVE"
+    said = (found, _next(decided, report.decision), _to_do(report) if undecided else "")
     return Asked(title, " ".join(part for part in said if part), "")
 
 
@@ -215,7 +216,7 @@ def _next(decided: Answer, decision: str) -> str:
 
 
 def _to_do(report: GateReport) -> str:
-    """What the gate advises to do next; empty where it advises nothing of its own."""
+    """What the gate advises next, where its decision is none; empty where it advises nothing."""
     _, advised, advice = report.diagnosis.rpartition(NEXT)
     return f"{NEXT}{advice}" if advised else ""
 

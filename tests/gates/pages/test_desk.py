@@ -178,7 +178,8 @@ def test_the_asked_box_says_what_was_found_what_is_required_and_what_would_decid
     })  # fmt: skip
     assert desk_of({"A": stopped}).asked.text == f"{own.question} {said}"
     advised = stopped.model_copy(update={"diagnosis": "Cause: one. Next: look. Next: try it."})
-    assert desk_of({"A": advised}).asked.text == f"{own.question} {said} Next: try it."
+    more = " Next: try it." if own.verdict == "INCONCLUSIVE" else ""
+    assert desk_of({"A": advised}).asked.text == f"{own.question} {said}{more}"
 
 
 def test_watch_it_says_which_way_was_measured_and_which_was_commanded():
