@@ -119,7 +119,9 @@ class Informed(ABC):
                 scene that nobody knows, in which nothing is executed.
         """
         now_ns, scene = self._begin(now_s), read_scene(poses)
-        self._journal.scene(now_s, poses if scene is not None else UNKNOWN)
+        # What was read is noted, since what was given need not be the same when it is read again.
+        told = UNKNOWN if scene is None else {n: (at[:3], at[3:]) for n, at in scene.items()}
+        self._journal.scene(now_s, told)
         self.stub.note_scene(scene)
         self._view = replace(self._view, scene=scene)
         self._drop(now_ns, DiscardReason.OBSERVATION_DIVERGENCE)

@@ -92,8 +92,7 @@ class _Session:
         self.open: dict[int, Message] = {}
         self.head: tuple[int, str] | None = None
         self.n, self.t = -1, -(1 << 62)
-        self.ended = False
-        self.last_sequence = -1
+        self.ended, self.last_sequence = False, -1
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
         self.last_row: dict[int, int] = {}
@@ -136,6 +135,7 @@ class _Session:
         if not self.ended:
             self.flag("journal.no_end", "The session has no end; its balance cannot be proved.")
         self._answered(self.t, final=True)
+        self._flag_all(self.world.unnoted())
 
     def _follow(self, kind: str, m: Message) -> None:
         if kind in ("accept", "fallback"):
@@ -310,7 +310,7 @@ class _Session:
         self._flag_all(self.proof.expected.projection.objections(chunk))
         if motion is None:
             return  # a row of it that is executed is a violation of its own (P6.ground)
-        if motion["scene"] != self.world.scene:
+        if motion["scene"] not in self.world.scenes_of(chunk["chunk_id"]):
             self.flag("P6.scene", f"{chunk['chunk_id']!r} was checked in another scene than seen.")
         age_ns = self.t - motion["measured_ns"]
         limit_ns = self.settings["maximum_age_ns"].get(chunk["phase"])
@@ -341,10 +341,10 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         expected = {**ALWAYS, **(self.expected.declared() if self.expected else {})}
         self.settings = {**m, **expected}
-        self.world.declare(self.settings)
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")
         for key, value in expected.items():
             if m[key] != value:
                 self.flag("settings.limits", f"{key} is {m[key]!r}, expected {value!r}.")
+        self.world.declare(self.settings)

@@ -41,12 +41,14 @@ MISSED = (DEADLINE, "overrun")
 class _Invocation:
     """One that is under way: what it saw, what it has cost since, and what was judged of it."""
 
+    begun_ns: int
     exposed_ns: int
     cost_s: float
     checks: int = 0
     judged: int = 0
     answered: bool = False
     over: bool = False
+    ended: bool = False
     failed: bool = False
 
     def due_ns(self) -> float:
@@ -67,6 +69,8 @@ class Invocations:
         self._terms = Terms()
         self._timed = False
         self._failing = ""
+        self._open: dict[str, _Invocation] = {}
+        self._tick_ns: int | None = None
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields what it could not have cost so little, or have seen."""
@@ -76,7 +80,9 @@ class Invocations:
         elif not self._timed:
             return
         yield from self._terms.follow(kind, m)
-        if kind == "invocation":
+        if kind == "observation":
+            yield from self._tick(m["t"])
+        elif kind == "invocation":
             yield from self._missed(m)
             yield from self._invocation(m)
         elif kind == "conditioning":
@@ -88,13 +94,16 @@ class Invocations:
         elif kind == "candidate":
             yield from self._candidate(m)
         elif kind == "enqueue" and m["source"] == "policy":
-            own = self._of.get(m["chunk_id"])
-            if own is None or own.judged == 0:
-                yield "clock.unknown", f"{m['chunk_id']!r} comes, and nothing of it was judged."
-            else:
-                yield from self._early(repr(m["chunk_id"]), own, m)
+            yield from self._enqueued(m)
         elif kind == "end" and self._failing:
             yield "clock.fault", f"{self._failing!r} failed, and its deadline is not missed."
+
+    def _enqueued(self, m: Message) -> Iterator[Finding]:
+        own = self._of.get(m["chunk_id"])
+        if own is None or own.judged == 0:
+            yield "clock.unknown", f"{m['chunk_id']!r} comes, and nothing of it was judged."
+        else:
+            yield from self._early(repr(m["chunk_id"]), own, m)
 
     def _missed(self, m: Message) -> Iterator[Finding]:
         """A fault and the deadline that it costs stand side by side."""
@@ -109,7 +118,8 @@ class Invocations:
             if own is not None:
                 yield "clock.begin", f"Invocation {m['id']!r} begins again."
                 return
-            own = self._of[m["id"]] = _Invocation(m["t"], float(m["detail"]))
+            own = _Invocation(m["t"], m["t"], float(m["detail"]))
+            self._of[m["id"]] = self._open[m["id"]] = own
             if not own.cost_s > 0.0:
                 yield "clock.latency", f"Invocation {m['id']!r} takes {own.cost_s} s."
         elif own is None:
@@ -130,26 +140,37 @@ class Invocations:
                 yield "clock.fault", f"{m['id']!r} failed, and had been judged or failed before."
             own.failed, self._failing = True, m["id"]
         else:
-            own.answered |= m["detail"] == ANSWERED
-            if own.failed and own.answered:
-                yield "clock.fault", f"{m['id']!r} failed, and is answered."
-            yield from self._in_time(own, m)
+            yield from self._end(own, m)
 
-    def _in_time(self, own: _Invocation, m: Message) -> Iterator[Finding]:
-        """Given up at the first tick at which its deadline is over, and not before."""
-        if self._expected is None:
+    def _end(self, own: _Invocation, m: Message) -> Iterator[Finding]:
+        own.answered |= m["detail"] == ANSWERED
+        if own.failed and own.answered:
+            yield "clock.fault", f"{m['id']!r} failed, and is answered."
+        if m["detail"] not in (ANSWERED, *MISSED):
+            yield "clock.end", f"{m['id']!r} ends as {m['detail']!r}, which is no end."
+        if own.ended:
+            yield "clock.end", f"{m['id']!r} ends again."
+        own.ended = True
+        self._open.pop(m["id"], None)
+        early = self._expected is not None and not self._is_over(own, m["t"])
+        if m["detail"] == DEADLINE and early:
+            yield "clock.deadline", f"{m['id']!r} is given up, and its deadline is not over."
+
+    def _tick(self, now_ns: int) -> Iterator[Finding]:
+        """At the tick before this one whatever was over has been given up, or had come."""
+        before_ns, self._tick_ns = self._tick_ns, now_ns
+        if self._expected is None or before_ns is None:
             return
-        expected = self._expected
-        most_ns = round(expected.deadline_s * 1e9) - TICK_ROUNDING_NS
-        waited_ns, period_ns = m["t"] - own.exposed_ns, round(expected.action_period_s * 1e9)
-        told = f"{m['id']!r} ends after {waited_ns} ns as {m['detail']}"
-        if m["detail"] == DEADLINE and not waited_ns >= most_ns:
-            yield "clock.deadline", f"{told}, and may take {expected.deadline_s:g} s."
-        if m["detail"] == ANSWERED and waited_ns - period_ns >= most_ns:
-            yield (
-                "clock.deadline",
-                f"{told}: its {expected.deadline_s:g} s were over a tick before.",
-            )
+        for name, own in list(self._open.items()):
+            # A term that takes too long ends it likewise, some of them at the tick behind.
+            if not own.over and before_ns > own.begun_ns and self._is_over(own, before_ns):
+                yield "clock.deadline", f"{name!r} was over at {before_ns} ns, and is not given up."
+                del self._open[name]
+
+    def _is_over(self, own: _Invocation, at_ns: int) -> bool:
+        assert self._expected is not None  # who asks has a deadline
+        most_ns = round(self._expected.deadline_s * 1e9) - TICK_ROUNDING_NS
+        return at_ns - own.exposed_ns >= most_ns
 
     def _candidate(self, m: Message) -> Iterator[Finding]:
         which, own = f"Candidate {m['index']} of {m['chunk_id']!r}", self._of.get(m["chunk_id"])

@@ -153,7 +153,10 @@ class Measured:
                 f"{m['chunk_id']!r} was checked from other joints than are stated.",
             )
             return
-        before = self._states.get(motion["measured_ns"] - self._period_ns)
+        before_ns = motion["measured_ns"] - self._period_ns
+        # A period need not be a whole number of ns, and each tick is rounded.
+        times_ns = (before_ns + off_ns for off_ns in (0, 1, -1, 2, -2))
+        before = next((self._states[t] for t in times_ns if t in self._states), None)
         told = motion.get("dq_meas_rad_s")
         if before is None or before is state:
             if told is not None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
 from genpolicy.verification.moved import moved_m
@@ -56,6 +57,7 @@ class WorldView:
         self.stopped = False
         self._strayed_ns: int | None = None
         self.scene: dict[str, str] = {}
+        self._begun_in: dict[str, dict[str, str]] | None = {}
         self.void_before: dict[str, int] = {}
         self._arrivals = 0
         self._void_arrivals: dict[str, int] = {}
@@ -74,6 +76,8 @@ class WorldView:
         """Take in what the session is held to."""
         self.fallback_hash = settings["fallback_hash"]
         self.divergence_limit_m = settings["maximum_divergence_m"]
+        if TIMED in settings["labels"]:
+            self._begun_in = None
 
     def follow(self, kind: str, m: Message, arrivals: int = 0) -> Iterator[Finding]:
         """Take an event in; yields what is wrong with the event itself.
@@ -85,9 +89,7 @@ class WorldView:
         """
         self._arrivals = arrivals
         if self._changes and kind not in CHANGES:
-            for name, (old, new, _) in self._changes.items():
-                yield f"journal.{name}", f"It changed from {old!r} to {new!r}, and nobody notes it."
-            self._changes.clear()
+            yield from self.unnoted()
         if kind not in KINDS:
             yield "journal.kind", f"There is no event of kind {kind!r}."
         elif kind in self._followed:
@@ -97,8 +99,24 @@ class WorldView:
             self._most_n = self._bears_n()
         elif kind == "scene":
             self.scene = m["bodies"]
+        elif kind == "invocation" and m["stage"] == "begin" and self._begun_in is not None:
+            self._begun_in[m["id"]] = self.scene
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
+
+    def scenes_of(self, chunk_id: str) -> tuple[dict[str, str] | None, ...]:
+        """In which of the scenes on record a chunk may have been checked.
+
+        The newest; where no virtual clock stands still for the check, also the one in which its
+        invocation began. How far it has moved since is asked of each action (P1.scene).
+        """
+        return self.scene, (self._begun_in or {}).get(chunk_id)
+
+    def unnoted(self) -> Iterator[Finding]:
+        """What the newest observation changed and no event says; once."""
+        for name, (old, new, _) in self._changes.items():
+            yield f"journal.{name}", f"It changed from {old!r} to {new!r}, and nobody notes it."
+        self._changes.clear()
 
     def objections(self, chunk: Message, kind: str, t: int, settings: Message) -> Iterator[Finding]:
         """Why an action of this chunk may not be accepted at `t`; nothing if it may."""

@@ -8,8 +8,11 @@ to where the recorded arm is, which clears no stop.
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+
+from numpy.typing import ArrayLike
 
 from genpolicy.candidates.selector import propose
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason
@@ -17,8 +20,8 @@ from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import Session
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.executor import Executor
+from genpolicy.execution.informed import UNKNOWN
 from genpolicy.execution.ledger import Conservation
-from genpolicy.execution.scene import Scene, moved_m, read_scene
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
@@ -102,7 +105,6 @@ class SupervisedSession:
         if stop_stands:  # one that takes over in a session that runs begins stopped
             self.stub.supervisor = Supervisor(cell.execution, journal)
         self._asked: Asked | None = None
-        self._scene: Scene | None = None
         self._row = 0
         self._asks = 0
 
@@ -118,10 +120,10 @@ class SupervisedSession:
         """
         self._row, replay, executor = row, self.replay, self.executor
         phase = replay.phases[row]
-        self._see(now_s, row, told=False)
         executor.observe(now_s, now_s, phase, replay.calibration_epoch)
         if self.stub.supervisor.observe_force(now_s, replay.forces_n[row], phase):
             executor.force_event(now_s)
+        self._see(now_s, row)
         executor.tick(now_s)
         asked = self._asked
         if asked is not None and self._overdue(asked, now_s):
@@ -130,13 +132,12 @@ class SupervisedSession:
             return None
         return self._ask(now_s, row)
 
-    def _see(self, now_s: float, row: int, *, told: bool = True) -> None:
-        """Say where bodies are seen, where that is wanted or they have moved since it was said."""
-        poses = self._task.scene_poses(self.replay.observation_rows[row])
-        scene, limit_m = read_scene(poses), self.cell.execution.maximum_scene_shift_m
-        if told or not moved_m(self._scene, scene) <= limit_m:
-            self._scene = scene
-            self.executor.see(now_s, poses)
+    def _see(self, now_s: float, row: int) -> None:
+        """Say where bodies are seen; where the task cannot tell, nobody knows, and that holds."""
+        poses: Mapping[str, tuple[ArrayLike, ArrayLike]] = UNKNOWN
+        with suppress(Exception):  # whatever a task raises, the tick goes on to what stops
+            poses = self._task.scene_poses(self.replay.observation_rows[row])
+        self.executor.see(now_s, poses)
 
     def _ask(self, now_s: float, row: int) -> Ask:
         executor, replay, horizons = self.executor, self.replay, self.cell.horizons
@@ -160,7 +161,6 @@ class SupervisedSession:
             candidate_index=0,
         )
         self._asks += 1
-        self._see(now_s, row)
         executor.begin_invocation(now_s, metadata.chunk_id)
         self._asked = Asked(metadata, row, now_s)
         return Ask(

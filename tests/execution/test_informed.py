@@ -82,3 +82,25 @@ def test_a_scene_that_cannot_be_read_is_one_that_nobody_knows(poses):
     assert rig.tick()[0].kind == "hold"
     assert rig.journal.last("scene")["bodies"].keys() == {""}
     judged(rig)
+
+
+class OnlyItems:
+    """Reads as bodies once, and as nothing else."""
+
+    def items(self):
+        return [("post", (np.array([0.9, 0.0, 0.0]), np.array([1.0, 0.0, 0.0, 0.0])))]
+
+
+@pytest.mark.parametrize("poses", [
+    OnlyItems(),
+    {"post": (part for part in ([0.9, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]))},
+    {"post": map(np.asarray, ([0.9, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]))},
+])  # fmt: skip
+def test_a_scene_that_can_be_read_only_once_is_read_once(poses):
+    rig = Rig()
+    rig.see(post=0.5)
+    begin(rig)
+    rig.executor.see(rig.now_s, poses)
+    assert rig.tick()[0].kind == "hold"
+    assert rig.journal.last("scene")["bodies"].keys() == {"post"}
+    judged(rig)

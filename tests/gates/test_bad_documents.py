@@ -77,7 +77,8 @@ def test_parameters_of_every_gate(fallen_over, tmp_path):
 
 def test_parameters_that_journals_are_held_to(fallen_over, monkeypatch):
     for name in ("load_task", "cell_of", "expected_motion"):
-        monkeypatch.setattr(rederive, name, lambda *given, **named: SimpleNamespace(action_at=None))
+        task = SimpleNamespace(action_at=None, scene_poses=None)
+        monkeypatch.setattr(rederive, name, lambda *given, task=task, **named: task)
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
     few = {name: params[name] for name in ("horizons", "execution", "feasibility", "task")}
     rederive._held_to(few)

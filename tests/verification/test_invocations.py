@@ -129,7 +129,8 @@ def test_a_session_without_a_clock_owes_nothing_and_one_with_a_clock_states_ever
 
 def test_an_answer_that_comes_behind_the_deadline_is_right_and_a_fallback_owes_nothing():
     late = changed(ANSWERED, detail="deadline")
-    assert rules(BEGIN, late, FIRST, ANSWERED, QUEUED) == []
+    assert rules(BEGIN, late, FIRST, QUEUED) == []
+    assert rules(BEGIN, late, FIRST, ANSWERED, QUEUED) == ["clock.end"]
     assert rules(changed(QUEUED, source="fallback", t=0)) == []
 
 
@@ -138,20 +139,62 @@ def test_what_is_unreadable_is_no_number_of_seconds():
         rules(changed(BEGIN, detail="soon"))
 
 
+def tick(at_ms):
+    return "observation", {"t": round(at_ms * MS)}
+
+
+TICKS = [tick(at_ms) for at_ms in range(100, 500, 50)]
+
+
+def clock(*told, deadline_s=None):
+    """What is said of the clock alone: the ticks here expose nothing."""
+    return [rule for rule in rules(*told, deadline_s=deadline_s) if rule.startswith("clock.")]
+
+
+def among_ticks(*events):
+    return sorted([*TICKS, *events], key=lambda event: event[1]["t"])
+
+
 @pytest.mark.parametrize(("end", "at_ms", "found"), [
-    ("deadline", 250, []), ("deadline", 249, ["clock.deadline"]), ("deadline", 300, []),
-    ("answered", 250, []), ("answered", 299, []), ("answered", 300, ["clock.deadline"]),
-    ("overrun", 200, []), ("overrun", 300, []),
+    ("deadline", 250, []), ("deadline", 200, ["clock.deadline"]),
+    ("deadline", 300, ["clock.deadline"]), ("deadline", 400, ["clock.deadline"]),
+    ("answered", 250, []), ("answered", 300, ["clock.deadline"]),
+    ("overrun", 200, []), ("overrun", 300, ["clock.deadline"]),
+    ("done", 250, ["clock.end"]),
 ])  # fmt: skip
 def test_an_invocation_is_given_up_at_the_first_tick_beyond_its_deadline(end, at_ms, found):
-    """Exposed at 100 ms with 150 ms: at the tick of 250 ms it is over, answered between is not."""
-    ended = changed(MISSED, t=at_ms * MS, detail=end)
-    assert rules(BEGIN, ended, deadline_s=0.15) == found
-    assert rules(BEGIN, ended) == []
+    """Exposed at 100 ms with 150 ms: it is over at the tick of 250 ms, which gives it up."""
+    told = among_ticks(BEGIN, changed(MISSED, t=at_ms * MS, detail=end))
+    assert clock(*told, deadline_s=0.15) == found
+    assert clock(*told) == [rule for rule in found if rule == "clock.end"]
+
+
+def test_one_that_never_ends_is_no_miss_that_nobody_counts():
+    assert clock(*among_ticks(BEGIN), deadline_s=0.15) == ["clock.deadline"]
+    assert clock(*among_ticks(BEGIN, MISSED, MISSED), deadline_s=0.15) == ["clock.end"]
+
+
+def test_one_that_began_with_an_old_observation_has_a_tick_to_answer():
+    """What it saw was 200 ms on its way: there was no tick between begin and answer."""
+    begin, end = changed(BEGIN, t=300 * MS), changed(MISSED, t=350 * MS)
+    for detail in ("answered", "deadline"):
+        told = among_ticks(begin, changed(end, detail=detail))
+        assert clock(*told, deadline_s=0.15) == []
+    assert clock(*among_ticks(begin, changed(end, t=400 * MS)), deadline_s=0.15) == [
+        "clock.deadline"
+    ]
+
+
+def test_a_term_that_took_too_long_ends_it_at_the_tick_behind():
+    over = ("invocation", {"t": 250 * MS, "id": "a", "stage": "overrun",
+                           "detail": "sample skip_invocation"})  # fmt: skip
+    ended = changed(MISSED, t=300 * MS, detail="overrun")
+    assert clock(*among_ticks(BEGIN, over, ended), deadline_s=0.15) == []
 
 
 def test_times_of_ticks_are_rounded():
     assert rules(BEGIN, changed(MISSED, t=250 * MS - 2), deadline_s=0.15) == []
-    late = changed(MISSED, detail="answered", t=300 * MS - 3)
-    assert rules(BEGIN, late, deadline_s=0.15) == []
-    assert rules(BEGIN, changed(late, t=300 * MS - 2), deadline_s=0.15) == ["clock.deadline"]
+    assert rules(BEGIN, changed(MISSED, t=250 * MS - 3), deadline_s=0.15) == ["clock.deadline"]
+    for before_ns, found in ((2, ["clock.deadline"]), (3, [])):
+        told = (BEGIN, tick(250 - before_ns / MS), tick(300))
+        assert clock(*told, deadline_s=0.15) == found

@@ -1,5 +1,6 @@
 """Measured states: a journal that is right, and one for each way to have measured otherwise."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -169,3 +170,18 @@ def test_the_scene_on_record_is_the_one_that_was_seen(bodies, found):
     journal = [SESSION, state(0), ("scene", {"t": 0, "bodies": told}), exposed(0), there(0),
                saw(0, SEEN[:1])]  # fmt: skip
     assert [rule for kind, m in journal for rule, _ in view.follow(kind, m)] == found
+
+
+def test_a_period_that_is_no_whole_number_of_nanoseconds_has_a_state_before():
+    """Ticks of a thirtieth of a second are rounded, each for itself."""
+    period_s = 1 / 30
+    times_ns = [round(k * period_s * 1e9) for k in range(4)]
+    assert len({b - a for a, b in pairwise(times_ns)}) == 2
+    session = ("session", {"t": 0, "labels": {"start_sha256": "ab"}, "period_ns": 33_333_333})
+    still = np.zeros(4, "<f8").tobytes().hex()
+    for first, second in pairwise(times_ns):
+        before, now = (("state", {**state(0)[1], "t": t}) for t in (first, second))
+        kind, chunk = queued(0)
+        motion = {**chunk["motion"], "measured_ns": second, "dq_meas_rad_s": still}
+        told = (before, now, (kind, {**chunk, "motion": motion}))
+        assert "state.velocity" not in rules(*told, session=session)

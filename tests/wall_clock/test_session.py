@@ -77,9 +77,59 @@ def test_an_answer_is_executed_from_the_next_tick_on(told):
     assert ask.noise == ("still", "0") and ask.observations.shape == (2, 24)
     told.answer(ask)
     told.decide()
-    assert told.session.stub.accepted == 0 and told.count("scene") == 2  # at first, and at the ask
+    assert told.session.stub.accepted == 0 and told.count("scene") == 1
     told.tick()
     assert told.session.stub.accepted == 1
+    told.end()
+    assert told.checked() == set()
+
+
+def moving(task, shifts_m):
+    """The task, of which at each further look the bodies stand so far aside; None: it raises."""
+
+    class Moving:
+        looks = iter(shifts_m)
+
+        def __getattr__(self, name):
+            return getattr(task, name)
+
+        def scene_poses(self, observation):
+            aside_m = next(self.looks)
+            if aside_m is None:
+                raise ValueError("the body is lost")
+            poses = task.scene_poses(observation)
+            return {
+                name: (at + np.array([0.0, aside_m, 0.0]), turn)
+                for name, (at, turn) in poses.items()
+            }
+
+    return Moving()
+
+
+@pytest.mark.parametrize(("shifts_m", "accepted"), [
+    ([0.0] * 6, 4), ([0.0, 0.015, 0.019, 0.015, 0.0, 0.0], 4),
+    ([0.0, -0.019, -0.03, -0.038, -0.038, -0.038], 1),  # each step is small
+])  # fmt: skip
+def test_a_body_is_held_against_where_it_stood_at_the_check(told, shifts_m, accepted):
+    told.session._task = moving(told.task, shifts_m)
+    told.answer(told.tick())
+    told.decide()
+    for _ in range(4):
+        told.tick()
+    assert told.session.stub.accepted == accepted
+    told.end()
+    assert told.checked() == set()
+
+
+def test_a_task_that_cannot_tell_its_scene_does_not_keep_a_force_from_stopping(told):
+    told.session._task = moving(told.task, [0.0, None, None])
+    told.answer(told.tick())
+    told.decide()
+    forces_n = (0.0, 1e3, *told.session.replay.forces_n[2:])
+    told.session.replay = told.session.replay.model_copy(update={"forces_n": forces_n})
+    told.tick()
+    assert told.session.stub.supervisor.stopped and told.session.stub.accepted == 0
+    told.tick()
     told.end()
     assert told.checked() == set()
 

@@ -86,16 +86,18 @@ class Launched(AbstractContextManager["Launched"]):
             self.address = entry.address
             return
         until = time.monotonic() + entry.start_timeout_s
+        seen = ""
         for _ in range(PORTS):
             try:
                 self._start(entry, entry.command, folder, until)
-            except PortTakenError:
+            except PortTakenError as taken:
+                seen = str(taken)
                 continue
             return
         raise PolicyError(
             Fault.CLOSED,
             f"who listens is no process of its command, on each of {PORTS} ports; start it, and "
-            "name its address",
+            "name its address" + (f" ({seen})" if seen else ""),
         )
 
     def died(self) -> str | None:
@@ -160,7 +162,7 @@ class Launched(AbstractContextManager["Launched"]):
         while True:
             if ended := self.died():
                 if _taken(port, ended):
-                    raise PortTakenError
+                    raise PortTakenError(ended)
                 raise PolicyError(Fault.CLOSED, ended)
             left = until - time.monotonic()
             try:
@@ -168,6 +170,7 @@ class Launched(AbstractContextManager["Launched"]):
             except PolicyError as fault:
                 if fault.fault is not Fault.CLOSED:
                     raise
+                answered = False
             else:
                 known = listens(port, marked(MARK, self._mark))
                 if known is False:

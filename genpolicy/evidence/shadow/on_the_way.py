@@ -27,6 +27,10 @@ OTHER = "0" * 64  # a hash of nothing
 CLOCK_STEP_S = 3600.0  # a daylight saving hour; far beyond what a clock may leap
 
 
+ASIDE_M = 0.02
+"""Beyond what a body may have moved, whatever that is."""
+
+
 @dataclass(frozen=True)
 class Way:
     """A session in which the chunk has not arrived yet.
@@ -96,7 +100,7 @@ def _pushed_away(way: Way) -> None:
 
 def _a_body_moved(way: Way) -> None:
     """Every body is seen elsewhere; of a task without any, a scene that cannot be read."""
-    aside_m = np.array([0.0, 2 * way.executor.cell.execution.maximum_scene_shift_m, 0.0])
+    aside_m = np.array([0.0, ASIDE_M + way.executor.cell.execution.maximum_scene_shift_m, 0.0])
     seen = {name: (np.asarray(at) + aside_m, turn) for name, (at, turn) in way.poses.items()}
     way.executor.see(way.now_s, seen or UNKNOWN)
 
