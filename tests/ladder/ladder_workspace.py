@@ -20,7 +20,6 @@ from flows.reproduce import RunEnd, reproduce, stage_environment
 from flows.workspace import make_workspace
 from gates.proof import SPECS
 from genpolicy.compiled import cache_folder
-from stages._stage import main
 
 ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
@@ -149,14 +148,14 @@ def run_stage(workspace: Path, name: str) -> tuple[int, str]:
 def run_here(workspace: Path, name: str) -> tuple[int, str]:
     """The same in this process: the checkout's code is the workspace's, and is imported once."""
     said = io.StringIO()
-    work = importlib.import_module(f"stages.{name}").work
+    stage = importlib.import_module(f"stages.{name}")
     with (
         mock.patch.dict(os.environ),
         contextlib.chdir(workspace),
         contextlib.redirect_stderr(said),
         pytest.raises(SystemExit) as end,
     ):
-        main(name, work)
+        stage.main(name, stage.work)
     assert isinstance(end.value.code, int)
     return end.value.code, last_words(name, said.getvalue())
 
