@@ -104,11 +104,11 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     executor.set_active(0.0, *maker(method))
     task, world = load_task("tabletop_insertion"), _world(start)
     seen, measured = world.observe(), Measured(task, world, journal)
-    journal.scene(0.0, task.scene_poses(seen))
     executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
         now_s = tick * horizons.action_period_s
         measured.note(now_s)
+        executor.see(now_s, task.scene_poses(seen))
         journal.exposure(now_s, seen)
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         executor.tick(now_s)
@@ -120,7 +120,7 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     journal.conditioning(0.2, invocation_id="one", exposed_s=now_s, key=key, history=history)
     if fault:
         journal.invocation(0.2, invocation_id="one", stage="fault", detail=fault)
-    executor.end_invocation(0.2, "one", "deadline")
+    executor.end_invocation(0.2, "one", "overrun")  # of a term: its deadline is not over
     if (method, start) == ("bc", 1):
         recovery = Recovery(execution, journal)
         recovery.trigger(0.2, "approach", "silence")
