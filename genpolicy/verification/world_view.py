@@ -76,7 +76,7 @@ class WorldView:
         """Take in what the session is held to."""
         self.fallback_hash = settings["fallback_hash"]
         self.divergence_limit_m = settings["maximum_divergence_m"]
-        if TIMED in settings["labels"]:
+        if TIMED in settings.get("labels", {}):
             self._begun_in = None
 
     def follow(self, kind: str, m: Message, arrivals: int = 0) -> Iterator[Finding]:
