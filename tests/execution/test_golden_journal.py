@@ -14,12 +14,12 @@ import numpy as np
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import Rig, StandInContext, StandInScene, passing_verdict
-from genpolicy.execution.cell import FALLBACK_HASH
 from genpolicy.execution.journal import EVENT_FIELDS
-from genpolicy.execution.recovery import Recovery, fallback_metadata
+from genpolicy.execution.recovery import Recovery
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from held import hold
+from playing import fall_back
 
 GOLDEN = Path(__file__).parent / "golden"
 OF_OTHERS = {"joined", "force", "push", "outcome", "person", "state", "latency"}
@@ -112,18 +112,7 @@ def somebody_else_commands(rig):
     recovery.trigger(rig.now_s, rig.phase, "divergence")
     recovery.feel(rig.now_s, 4.5)
     recovery.feel(rig.now_s, 4.25)
-    rig.executor.begin_fallback(rig.now_s)
-    rig.tick(5)
-    recovery.advance(rig.now_s)
-    rig.observe()
-    metadata = fallback_metadata(
-        rig.executor, now_s=rig.now_s, chunk_id="way back", event_time_s=rig.now_s,
-        phase=rig.phase, epoch=rig.epoch,
-    )  # fmt: skip
-    assert metadata.policy_checkpoint_hash == FALLBACK_HASH
-    chunk = rig.chunk()  # its context rests, as the arm does after a hold
-    rig.executor.deliver_fallback(rig.remade(chunk, metadata, chunk.actions), rig.now_s)
-    rig.tick(3)
+    fall_back(rig, recovery, ticks=3)
     recovery.primitive_failed(rig.now_s, "lost")
     recovery.stop(rig.now_s, "force")
     recovery.human_reset(rig.now_s, "Ann")

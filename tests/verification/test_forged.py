@@ -9,9 +9,9 @@ import copy
 import pytest
 
 from genpolicy.evidence.shadow.rig import Rig
-from genpolicy.execution.cell import FALLBACK_HASH
-from genpolicy.execution.recovery import Recovery, fallback_metadata
+from genpolicy.execution.recovery import Recovery
 from genpolicy.verification.checker import check_messages
+from tests.execution.playing import fall_back
 
 STEP_NS = 10**9
 HEX = 16
@@ -79,18 +79,7 @@ def honest():
     rig.run(2)
     recovery = Recovery(rig.cell.execution, rig.journal)
     recovery.trigger(rig.now_s, rig.phase, "silence")
-    rig.executor.begin_fallback(rig.now_s)
-    rig.tick(5)
-    recovery.advance(rig.now_s)
-    rig.observe()
-    metadata = fallback_metadata(
-        rig.executor, now_s=rig.now_s, chunk_id="way back", event_time_s=rig.now_s,
-        phase=rig.phase, epoch=rig.epoch,
-    )  # fmt: skip
-    assert metadata.policy_checkpoint_hash == FALLBACK_HASH
-    chunk = rig.chunk()
-    rig.executor.deliver_fallback(rig.remade(chunk, metadata, chunk.actions), rig.now_s)
-    rig.tick(2)
+    fall_back(rig, recovery, ticks=2)
     recovery.primitive_failed(rig.now_s, "lost")
     rig.supervisor.observe_force(rig.now_s, 99.0, rig.phase)
     recovery.stop(rig.now_s, "force")
