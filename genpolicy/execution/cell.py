@@ -244,7 +244,6 @@ class Cell:
             period_ns=self.period_ns,
             controller_mode=self.controller_mode,
             divergence_limit_m=self.execution.maximum_divergence_m,
-            scene={},
             scene_limit_m=self.execution.maximum_scene_shift_m,
         )
 

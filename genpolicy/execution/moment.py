@@ -64,7 +64,7 @@ class View:
         controller: Mode that the controller says it is in; empty before it said one.
         controller_mode: The mode that it must be in.
         divergence_limit_m: Measured from commanded TCP, beyond which chunks are void.
-        scene: Where bodies were seen last; None where that cannot be read.
+        scene: Where bodies were seen last; None until somebody says, and where it cannot be read.
         scene_limit_m: How far they may stand from where a chunk was checked with them.
     """
 

@@ -10,14 +10,14 @@ LEVER_M = 0.1
 """A turn counts as the way of a point this far from a body's origin."""
 
 
-def moved_m(checked: dict[str, str], seen: dict[str, str]) -> float:
+def moved_m(checked: dict[str, str], seen: dict[str, str] | None) -> float:
     """Longest way of a body between two scenes, m; infinite where they are not of one set of them.
 
     Args:
         checked: Bodies by name: x, y, z, m, and w, x, y, z, as a journal has numbers.
-        seen: Likewise.
+        seen: Likewise; None where nobody has said it.
     """
-    if set(checked) != set(seen):
+    if seen is None or set(checked) != set(seen):
         return math.inf
     longest_m = 0.0
     for name, text in checked.items():

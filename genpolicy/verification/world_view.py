@@ -56,8 +56,8 @@ class WorldView:
         self.controller = ""
         self.stopped = False
         self._strayed_ns: int | None = None
-        self.scene: dict[str, str] = {}
-        self._begun_in: dict[str, dict[str, str]] | None = {}
+        self.scene: dict[str, str] | None = None
+        self._begun_in: dict[str, dict[str, str] | None] | None = {}
         self.void_before: dict[str, int] = {}
         self._arrivals = 0
         self._void_arrivals: dict[str, int] = {}

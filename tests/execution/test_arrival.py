@@ -8,9 +8,7 @@ from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import (
-    CHECKPOINT,
     ROWS,
-    SAMPLER,
     Rig,
     StandInVerdict,
     passing_verdict,
@@ -124,8 +122,7 @@ def test_a_rejected_or_lost_chunk_is_written_off_once():
 def test_only_what_feasibility_issued_is_taken_by_default():
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
-    strict.set_active(0.0, CHECKPOINT, SAMPLER)
-    strict.controller(0.0, rig.cell.controller_mode)
+    rig.begin(strict)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
     assert strict.deliver(rig.chunk(), 0.0) is R.INFEASIBLE
     assert strict.tick(0.0).kind == "hold"
@@ -191,8 +188,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
 
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
-    strict.set_active(0.0, CHECKPOINT, SAMPLER)
-    strict.controller(0.0, rig.cell.controller_mode)
+    rig.begin(strict)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
 
     def issued():

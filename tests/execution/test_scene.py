@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 from playing import judged
 
-from genpolicy.evidence.shadow.rig import EXECUTION, IMITATED, Rig
+from genpolicy.evidence.shadow.rig import (
+    CHECKPOINT,
+    EXECUTION,
+    IMITATED,
+    SAMPLER,
+    Rig,
+)
 from genpolicy.execution.checks import without
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.journal import Journal
 from genpolicy.execution.scene import LEVER_M, moved_m, read_scene
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor
 from genpolicy.verification.moved import moved_m as independently_m
 
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
@@ -33,8 +43,8 @@ def in_hex(scene):
 def test_how_far_a_body_has_moved(now, way_m):
     """Two words for it, and neither of them ours: a chord is twice radius times sine of half."""
     assert moved_m(at(), now) == moved_m(now, at()) == pytest.approx(way_m, abs=1e-8)
-    if now is not None:
-        assert independently_m(in_hex(at()), in_hex(now)) == pytest.approx(way_m, abs=1e-8)
+    told = None if now is None else in_hex(now)
+    assert independently_m(in_hex(at()), told) == pytest.approx(way_m, abs=1e-8)
 
 
 def test_the_body_that_moved_furthest_counts():
@@ -55,6 +65,25 @@ def test_what_is_no_scene_is_unknown_and_nothing_is_executed_in_it(poses):
     rig.tick(2)
     assert rig.stub.accepted == 2
     assert rig.executor.conservation().rest_discarded == {"observation_divergence": 1}
+    judged(rig)
+
+
+@pytest.mark.parametrize(("says", "accepted"), [(False, 0), (True, 2)])
+def test_a_session_that_never_says_its_scene_executes_nothing(says, accepted):
+    """Whoever drives it may forget to; of a scene without bodies it says that there are none."""
+    rig = Rig()
+    rig.journal = Journal("driven by somebody else")
+    rig.supervisor = Supervisor(rig.cell.execution, rig.journal, checks=IMITATED)
+    rig.stub = ControllerStub(rig.cell, rig.journal, rig.supervisor, checks=IMITATED)
+    rig.executor = Executor(rig.cell, rig.journal, rig.stub, checks=IMITATED)
+    rig.executor.set_active(rig.now_s, CHECKPOINT, SAMPLER)
+    rig.executor.controller(rig.now_s, rig.cell.controller_mode)
+    if says:
+        rig.see()
+    rig.run(2)
+    assert rig.stub.accepted == accepted
+    refused = {} if says else {"observation_divergence": 1}
+    assert rig.executor.conservation().chunks.discarded == refused
     judged(rig)
 
 

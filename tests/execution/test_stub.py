@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS
-from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig, StandInContext
+from genpolicy.evidence.shadow.rig import IMITATED, Rig, StandInContext
 from genpolicy.execution.checks import CHECKS, Place, without
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -20,12 +20,8 @@ SEEN_BY_THE_STUB = [
 def half_asleep(check):
     """A rig whose executor lacks one check, while its stub has them all."""
     rig = Rig(checks=IMITATED if check != "issued" else CHECKS)
-    rig.executor = Executor(
-        rig.cell, rig.journal, rig.stub,
-        checks=without(IMITATED if check != "issued" else CHECKS, check),
-    )  # fmt: skip
-    rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
-    rig.executor.controller(0.0, rig.cell.controller_mode)
+    asked = without(IMITATED if check != "issued" else CHECKS, check)
+    rig.begin(Executor(rig.cell, rig.journal, rig.stub, checks=asked))
     return rig
 
 

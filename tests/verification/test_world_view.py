@@ -249,6 +249,7 @@ def stands(x_m, y_m=0.0):
     ({"fixture": stands(0.5)["post"]}, ["P1.scene"]),
 ])  # fmt: skip
 def test_a_chunk_that_was_checked_in_another_scene_than_the_one_seen_is_found(view, checked, found):
+    assert rules(view, motion={"scene": checked}) == ["P1.scene"]  # nobody has said any
     assert list(view.follow("scene", {"bodies": stands(0.5)})) == []
     assert rules(view, motion={"scene": checked}) == found
     assert list(view.follow("scene", {"bodies": {"": ""}})) == []

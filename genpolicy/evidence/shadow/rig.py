@@ -150,13 +150,18 @@ class Rig:
         self.supervisor = supervisor(self.cell.execution, self.journal, checks=checks)
         own = checks if stub_checks is None else stub_checks
         self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=own)
-        self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"
         self.poses: dict[str, tuple[Array, Array]] = {}
         self.made = 0
-        self.executor.set_active(self.now_s, CHECKPOINT, SAMPLER)
-        self.executor.controller(self.now_s, self.cell.controller_mode)
+        self.begin(Executor(self.cell, self.journal, self.stub, checks=checks))
+
+    def begin(self, executor: Executor) -> None:
+        """Let this one command; it hears what every session says first."""
+        self.executor = executor
+        executor.set_active(self.now_s, CHECKPOINT, SAMPLER)
+        executor.controller(self.now_s, self.cell.controller_mode)
+        executor.see(self.now_s, self.poses)
 
     @property
     def now_s(self) -> float:
