@@ -84,6 +84,7 @@ def _executed(gate: Gate) -> list[Bound]:
         Bound(gate, "execution.force_limit_n", "<=", HARDEST_CONTACT_N, force),
         Bound(gate, "execution.maximum_age_s", "<=", OLDEST_ACTION_S, AGED),
         Bound(gate, "execution.maximum_divergence_m", "<=", 0.2, "the arm is where nobody planned"),
+        Bound(gate, "execution.maximum_scene_shift_m", "<=", 0.05, "the scene is another one"),
         Bound(gate, "feasibility.position_change_limit_m", "<=", 0.1, "a chunk bent so far is new"),
     ]
 

@@ -88,6 +88,7 @@ SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
         "execution.watchdog_s",
         "execution.maximum_age_s",
         "execution.maximum_divergence_m",
+        "execution.maximum_scene_shift_m",
         "execution.force_limit_n",
     ),
     "<=",

@@ -49,13 +49,13 @@ from genpolicy.evidence.stress.perturbations import ReducedEnvelope
 from genpolicy.evidence.stress.settings import ENVELOPE as CONDITION
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import power_document
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
+from genpolicy.execution.figures import expected_settings
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
-from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.expected import ExpectedSettings
@@ -171,25 +171,11 @@ def _printed(root: Path, gate: Gate) -> None:
 def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotion]:
     """What every session must have declared, and what every executed row must have kept to."""
     horizons = section(params, "horizons", HorizonConfig)
-    execution = section(params, "execution", ExecutionSettings)
-    expected = ExpectedSettings(
-        execution_horizon=horizons.execution_horizon,
-        action_period_s=horizons.action_period_s,
-        maximum_age_s=execution.maximum_age_s,
-        watchdog_s=execution.watchdog_s,
-        queue_capacity=execution.queue_capacity,
-        controller_mode=CONTROLLER_MODE,
-        replan_lead_rows=execution.replan_lead_rows,
-        late_chunk=execution.late_by_phase,
-        force_limit_n=execution.force_limit_n,
-        maximum_divergence_m=execution.maximum_divergence_m,
-        maximum_scene_shift_m=execution.maximum_scene_shift_m,
-        deadline_s=execution.deadline_s,
-    )
+    held_to = Cell(horizons, section(params, "execution", ExecutionSettings))
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)
     cell = cell_of(task, feasibility, action_period_s=horizons.action_period_s)
-    return expected, expected_motion(cell, task.action_at, task.scene_poses)
+    return expected_settings(held_to), expected_motion(cell, task.action_at, task.scene_poses)
 
 
 def _tables(

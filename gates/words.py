@@ -11,6 +11,14 @@ DIGITS = 3
 """Of a number that a person reads; the JSON of a report has all."""
 SHOWN_HASH = 12
 """Characters of a hash that a reader compares; the file that is shown has all of it."""
+NEXT = "Next: "
+"""Begins the last sentence of a diagnosis that knows what to do."""
+
+
+def advice_of(diagnosis: str) -> str:
+    """What a diagnosis says to do next, with the word that says so; empty where it says nothing."""
+    _, said, advice = diagnosis.rpartition(NEXT)
+    return said + advice if said else ""
 
 
 def three(value: float, *, digits: int = DIGITS) -> str:

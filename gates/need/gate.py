@@ -19,17 +19,18 @@ from gates.need.settings import (
 )
 from gates.report import stage_of
 from gates.settings import read_limits, read_params, read_settings
+from gates.words import NEXT
 
 ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
 SIMPLER = (
-    "Next: run the simpler policy that the criterion names; nothing in the data has to be mended."
+    f"{NEXT}run the simpler policy that the criterion names; nothing in the data has to be mended."
 )
 OPEN = (
-    "Next: record more episodes, to know whether the simpler policy that the criterion names is "
+    f"{NEXT}record more episodes, to know whether the simpler policy that the criterion names is "
     "enough; nothing in the data has to be mended."
 )
 NEAR = (
-    "Next: try the simpler policy that the criterion names: it is about as good as the limit "
+    f"{NEXT}try the simpler policy that the criterion names: it is about as good as the limit "
     "allows, more recordings will hardly tell on which side, and nothing in the data has to be "
     "mended."
 )

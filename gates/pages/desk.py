@@ -14,6 +14,7 @@ from gates.pages.numbers import at_its_end, beyond, judged_at, rests_on
 from gates.readable import between, human
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import decided_by
+from gates.words import advice_of
 
 HEADLINES: dict[Gate, tuple[str, str]] = {
     "A": ("multimodal_situations", "held-out situations in which more than one way is taken"),
@@ -23,8 +24,6 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
     "E": ("owners_signed", "owners have signed"),
 }
 """The one number of each gate, and what it is a number of."""
-NEXT = "Next: "
-"""How the advice of a gate begins, at the end of its diagnosis."""
 
 
 @dataclass(frozen=True)
@@ -185,8 +184,8 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
         return Asked(title, report.diagnosis or report.decision, "")
     who = f" ({decided.candidate})" if decided.candidate else ""
     found = f"{decided.question}{who} {_against(decided)}"
-    undecided = decided.verdict == "INCONCLUSIVE"
-    said = (found, _next(decided, report.decision), _to_do(report) if undecided else "")
+    advice = advice_of(report.diagnosis) if decided.verdict == "INCONCLUSIVE" else ""
+    said = (found, _next(decided, report.decision), advice)
     return Asked(title, " ".join(part for part in said if part), "")
 
 
@@ -213,12 +212,6 @@ def _next(decided: Answer, decision: str) -> str:
     if decided.verdict != "INCONCLUSIVE":
         return decision
     return sentence(decided.caveat.rpartition("; ")[2].removeprefix(f"{INSIDE}: "))
-
-
-def _to_do(report: GateReport) -> str:
-    """What the gate advises next, where its decision is none; empty where it advises nothing."""
-    _, advised, advice = report.diagnosis.rpartition(NEXT)
-    return f"{NEXT}{advice}" if advised else ""
 
 
 def _box(gate: Gate, report: GateReport | None) -> Box:

@@ -14,6 +14,7 @@ from flows.estimate import DOCUMENTED
 from gates.overview import Line, as_text
 from gates.report import GateReport, stage_of
 from gates.verdicts import decided_text
+from gates.words import advice_of
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -48,11 +49,10 @@ def section(found: dict[str, dict]) -> str:
 def _of_gate(gate: str, report: dict) -> list[str]:
     criteria = report["criteria"]
     holding = [item for item in criteria if item["verdict"] == "PASS"]
-    _, _, following = report["diagnosis"].partition("Next: ")
-    following = f" Next: {following}" if following else ""
+    following = advice_of(report["diagnosis"])
     lines = [
         f"**Gate {gate} is {report['verdict']}**: {len(holding)} of {len(criteria)} criteria hold.",
-        f"{report['decision']}{following}",
+        f"{report['decision']} {following}".rstrip(),
         "",
         "| criterion | asks | found | allowed | |",
         "|---|---|---|---|---|",

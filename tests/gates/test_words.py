@@ -51,3 +51,16 @@ def test_three_digits_and_no_powers_of_ten_where_a_person_writes_none():
     assert words.three(1e12) == "1e+12"
     assert words.percent(math.nan) == "nan %", "what is not known is no number"
     assert words.number(0.5) == "0.5" and words.number(12345) == "12,345"
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "advice"),
+    [
+        ("First unmet: x. Next: record more.", "Next: record more."),
+        ("Next: a. Next: b.", "Next: b."),
+        ("Nothing to do.", ""),
+        ("", ""),
+    ],
+)
+def test_the_last_advice_of_a_diagnosis_is_what_to_do(diagnosis, advice):
+    assert words.advice_of(diagnosis) == advice

@@ -33,16 +33,15 @@ from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.cell import Cell, ExecutionSettings
+from genpolicy.execution.figures import expected_settings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.demonstrations import record_session
 from genpolicy.verification.checker import check_journal
-from genpolicy.verification.expected import ExpectedSettings
 
 EPISODES, ROLLOUTS, SEED = 12, 10, 3
 NOTHING_HELD = ("payload_torque", "contact_surface", "contact_force")
@@ -227,23 +226,9 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
     assert [r.outcome for r in rollouts] == [Outcome.SUCCESS] * ROLLOUTS
     journal = tmp_path / "journal.mcap"
     write_journal(journal, [rollout.journal for rollout in rollouts])
-    expected = ExpectedSettings(
-        execution_horizon=cell.horizons.execution_horizon,
-        action_period_s=cell.horizons.action_period_s,
-        maximum_age_s=cell.execution.maximum_age_s,
-        watchdog_s=cell.execution.watchdog_s,
-        queue_capacity=cell.execution.queue_capacity,
-        controller_mode=CONTROLLER_MODE,
-        replan_lead_rows=cell.execution.replan_lead_rows,
-        late_chunk=cell.execution.late_by_phase,
-        force_limit_n=cell.execution.force_limit_n,
-        maximum_divergence_m=cell.execution.maximum_divergence_m,
-        maximum_scene_shift_m=cell.execution.maximum_scene_shift_m,
-        deadline_s=cell.execution.deadline_s,
-    )
     task = rollouts[0].setup.task
     motion = expected_motion(cell.checker.cell, task.action_at, task.scene_poses)
-    report = check_journal(journal, expected, motion)
+    report = check_journal(journal, expected_settings(Cell(cell.horizons, cell.execution)), motion)
     assert not report.violations and report.reproved_actions > 100
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
+from genpolicy.evidence.shadow.on_the_way import ASIDE_M
 from genpolicy.evidence.shadow.rig import IMITATED, ROWS, Rig, passing_verdict
 from genpolicy.execution.checks import CHECKS, Check, Checks, Place, without
 from genpolicy.execution.journal import write_journal
@@ -278,7 +279,7 @@ def _a_body_moves(rig: Rig) -> None:
     """A chunk is checked with a post that is then seen elsewhere."""
     rig.see(post=0.5)
     _begin(rig)
-    rig.see(post=0.5 + 2 * rig.cell.execution.maximum_scene_shift_m)
+    rig.see(post=0.5 + ASIDE_M + rig.cell.execution.maximum_scene_shift_m)
     rig.tick(2)
 
 

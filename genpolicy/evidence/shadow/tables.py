@@ -26,6 +26,7 @@ from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.stop_mutants import stop_mutants
 from genpolicy.evidence.shadow.vote_mutants import vote_mutants
 from genpolicy.execution.cell import Cell
+from genpolicy.execution.figures import expected_settings
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell
@@ -33,7 +34,6 @@ from genpolicy.feasibility.figures import expected_motion
 from genpolicy.integrity.rows import write_rows
 from genpolicy.tasks.api import Task
 from genpolicy.verification.checker import check_journal
-from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.report import JournalReport
 
 
@@ -121,21 +121,7 @@ def checker_document(
         robot: What actions were checked in.
         task: The task, where sessions are on the virtual clock and state what was measured.
     """
-    horizons, execution = cell.horizons, cell.execution
-    expected = ExpectedSettings(
-        execution_horizon=horizons.execution_horizon,
-        action_period_s=horizons.action_period_s,
-        maximum_age_s=execution.maximum_age_s,
-        watchdog_s=execution.watchdog_s,
-        queue_capacity=execution.queue_capacity,
-        controller_mode=cell.controller_mode,
-        replan_lead_rows=execution.replan_lead_rows,
-        late_chunk=execution.late_by_phase,
-        force_limit_n=execution.force_limit_n,
-        maximum_divergence_m=execution.maximum_divergence_m,
-        maximum_scene_shift_m=execution.maximum_scene_shift_m,
-        deadline_s=execution.deadline_s,
-    )
+    expected = expected_settings(cell)
     motion = (
         expected_motion(robot)
         if task is None

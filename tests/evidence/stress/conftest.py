@@ -19,16 +19,15 @@ from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome, Setup
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
+from genpolicy.execution.figures import expected_settings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
-from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 from genpolicy.verification.checker import check_journal
-from genpolicy.verification.expected import ExpectedSettings
 
 PARAMS = read_yaml(Path(__file__).parents[3] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
@@ -122,24 +121,10 @@ def check(rollouts, folder, *, execution=EXECUTION):
     """Write the journals and let the independent checker read them back."""
     path = folder / "journal.mcap"
     write_journal(path, [rollout.journal for rollout in rollouts])
-    expected = ExpectedSettings(
-        execution_horizon=HORIZONS.execution_horizon,
-        action_period_s=HORIZONS.action_period_s,
-        maximum_age_s=execution.maximum_age_s,
-        watchdog_s=execution.watchdog_s,
-        queue_capacity=execution.queue_capacity,
-        controller_mode=CONTROLLER_MODE,
-        replan_lead_rows=execution.replan_lead_rows,
-        late_chunk=execution.late_by_phase,
-        force_limit_n=execution.force_limit_n,
-        maximum_divergence_m=execution.maximum_divergence_m,
-        maximum_scene_shift_m=execution.maximum_scene_shift_m,
-        deadline_s=execution.deadline_s,
-    )
     setup = rollouts[0].setup if rollouts else None
     task = setup and setup.task
     motion = setup and expected_motion(setup.checker.cell, task.action_at, task.scene_poses)
-    return check_journal(path, expected, motion)
+    return check_journal(path, expected_settings(Cell(HORIZONS, execution)), motion)
 
 
 @pytest.fixture(scope="session")
