@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from gates.report import Gate
 
+Comparison = Literal["<=", ">="]
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -25,15 +27,17 @@ class Bound:
             its owner may declare it not applicable. None where no task may.
         derives: Whether `derived` is written in place of a number: what follows from settings is
             held to the bound where it is derived.
+        of: What of the setting is held to the bound, where that is not the setting itself.
     """
 
     gate: Gate
     place: str
-    comparison: Literal["<=", ">="]
+    comparison: Comparison
     bound: float
     reason: str
     waivable: Callable[[Mapping[str, Any]], bool] | None = None
     derives: bool = False
+    of: Callable[[Any], Any] | None = None
 
 
 HARDEST_CONTACT_N = 80.0
@@ -71,6 +75,70 @@ def _touches_nothing(params: Mapping[str, Any]) -> bool:
     return not any(fields.get("contact_force_n") for fields in _planned(params, PUSH))
 
 
+def _may_lack(params: Mapping[str, Any]) -> bool:
+    """A task may lack what is asked: its owner says so by name, and the page repeats it."""
+    return True
+
+
+def _gain(effect: Any) -> Any:
+    """By how much the planned candidate is better; what is no pair of numbers goes no further."""
+    try:
+        baseline, candidate = effect
+        return candidate - baseline
+    except (TypeError, ValueError):
+        return effect
+
+
+def _need() -> list[Bound]:
+    """Limits of Gate A at which its question to the data, or to a simpler policy, says nothing."""
+    cause = "gate_a.cause"
+    simple = "what is valid nine times of ten is the policy"
+    reversed_time = "no time goes back, and no column answers another's command"
+    unit = "a unit that is wrong differs by so much"
+    half = "who succeeds less often than it fails is no way to go"
+    faults = "a fault in one episode of ten is the data"
+    seen = "of so little nothing can be said"
+    found: list[tuple[str, Comparison, float, str]] = [
+        ("mode_feasible_share", ">=", 0.5, "a mode refused as often as not is no target"),
+        ("mode_success_lower", ">=", 0.3, half),
+        ("mean_defeated_share", ">=", 0.3, "where the mean passes a point policy passes"),
+        ("multimodal_situations", ">=", 10.0, seen),
+        ("held_out_situations", ">=", 20.0, seen),
+        ("persistence_margin", ">=", 0.02, "an identity that shuffled time shows too is none"),
+        ("chunking_valid_share", "<=", 0.9, simple),
+        ("factor_valid_share", "<=", 0.9, simple),
+        ("baseline_mode_coverage", "<=", 0.95, "who keeps nearly every mode needs no density"),
+        (f"{cause}.clock_disorder", "<=", 0.0, reversed_time),
+        (f"{cause}.swapped_columns", "<=", 0.0, reversed_time),
+        (f"{cause}.rate_deviation", "<=", 0.5, "rows at another rate are other actions"),
+        (f"{cause}.frozen_s", "<=", 2.0, "nobody acts on what was seen so long ago"),
+        (f"{cause}.gap_share", "<=", 0.1, "every chunk of 16 would hold a gap"),
+        (f"{cause}.jitter_share", "<=", 1.0, "a row a period beside its time is the next row"),
+        (f"{cause}.gain_factor", "<=", 10.0, unit),
+        (f"{cause}.gain_epoch_factor", "<=", 1.5, "half as far again is another arm"),
+        (f"{cause}.magnitude_factor", "<=", 10.0, unit),
+        (f"{cause}.frame_angle_rad", "<=", 0.5, "axes turned by 30 degrees are others"),
+        (f"{cause}.faulty_episodes_share", "<=", 0.1, faults),
+        (f"{cause}.lag_drift_rows", "<=", 5.0, "a lag that drifts so far is two lags"),
+        (f"{cause}.supported_episodes", ">=", 5.0, seen),
+        (f"{cause}.supported_share", ">=", 0.05, seen),
+        (f"{cause}.denial_share", ">=", 0.2, "modes are not denied where nobody looked"),
+    ]  # fmt: skip
+    lacked: list[tuple[str, Comparison, float, str]] = [
+        ("clock_residual_s", "<=", 0.05, "rows of one time were seen at others"),
+        ("calibration_residual_m", "<=", 0.02, "what is held misses what it is to meet"),
+        ("lag_spread_rows", "<=", 2.0, "epochs two actions apart are two robots"),
+        ("label_disagreement", "<=", 0.3, "labels wrong once in three teach failures"),
+        ("strata_effect", "<=", 0.7, "who is right 17 times of 20 has seen the choice"),
+        ("phase_collapse_share", "<=", 0.8, "what the phase decides is no choice"),
+        ("latent_dependence_p", "<=", 0.2, "a style by chance once in five is no strategy"),
+    ]  # fmt: skip
+    return [
+        *(Bound("A", *row) for row in found),
+        *(Bound("A", *row, waivable=_may_lack) for row in lacked),
+    ]
+
+
 def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
     return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
 
@@ -98,6 +166,9 @@ BOUNDS: tuple[Bound, ...] = (
     Bound("A", "cause_accepted", ">=", 1.0, "modes of another cause are no reason for a generator"),
     Bound("A", "told_share", "<=", 0.7, "who is right 17 times of 20 has seen the choice"),
     Bound("A", "remedy_valid_share", "<=", 0.9, "what is valid nine times of ten is the policy"),
+    *_counts("A", "what nobody asked reads like a good answer", "unasked_checks"),
+    *_counts("A", "two factors changed at once separate nothing", "factors_isolated"),
+    *_need(),
     *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
     *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
     *_counts("B", "numbers that mean something else command something else", "conformance"),
@@ -166,6 +237,7 @@ BOUNDS: tuple[Bound, ...] = (
     Bound("D", "stress.starts", ">=", 59, "fewer bound no p95, whatever the confidence"),
     Bound("D", "confidence", ">=", 0.9, "what is wrong more often than once in ten is no bound"),
     Bound("D", "stress.alpha", "<=", 0.1, "a wrong promotion once in ten trials at the most"),
+    Bound("D", "stress.planned_effect", "<=", 0.5, "less is worth promoting too", of=_gain),
     Bound("D", "stress.margin", ">=", 0.0, "a candidate that is worse is not promoted"),
     Bound(
         "D",

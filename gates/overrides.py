@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from gates.card.names import says
 from gates.criterion import Criterion
 from gates.floors import BOUNDS
 from gates.preregistration import AT_LEAST, at, by_criterion
@@ -33,6 +32,7 @@ from gates.report import (
 )
 from gates.settings import DERIVED, LIMITS, NOT_APPLICABLE, Limits, require_plain
 from gates.verdicts import at_most, combine, judge_criterion, margin
+from genpolicy.contract.names import says
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of

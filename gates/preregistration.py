@@ -75,11 +75,25 @@ PLANNED: Mapping[str, Planned] = {
     "gate_d.tolerances": Planned("", "D"),
 }
 """What the plan names beside limits."""
-IF_STATED: Mapping[str, Planned] = {"gate_d.utility": Planned("", "D")}
-"""What it names only where it is stated: without weights success is compared, as in every plan that
-is older than they are."""
+IF_STATED: Mapping[str, Planned] = {
+    "gate_a.factors": Planned("", "A"),
+    "gate_a.waived_checks": Planned("", "A"),
+    "gate_d.utility": Planned("", "D"),
+}
+"""What it names only where it is stated: every factor is asked, no question is waived, and without
+weights success is compared, as in every plan that is older than they are."""
 STATED: Mapping[str, Planned] = {**PLANNED, **IF_STATED}
-SECTIONS: Mapping[str, Gate] = {"feasibility": "A", "execution": "C"}
+SECTIONS: Mapping[str, Gate] = {
+    "horizons": "A",
+    "feasibility": "A",
+    "audit": "A",
+    "train_baselines": "A",
+    "measure_baselines": "A",
+    "train_factors": "A",
+    "measure_factors": "A",
+    "execution": "C",
+    "shadow": "C",
+}
 """Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
 SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
     (

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gates.floors import BOUNDS, Bound
+from gates.preregistration import CAUSE, at, by_criterion
 from gates.report import Gate, stage_of
 from gates.settings import DERIVED, LIMITS, NOT_APPLICABLE
 from gates.severity import PLACE, too_mild
@@ -43,6 +44,7 @@ class Named:
 SIMPLER = "a simpler policy that is not asked is never found to be enough"
 NAMED: tuple[Named, ...] = (
     Named("A", "remedies", ("chunked_l1", "bc_noise"), SIMPLER),
+    Named("A", "factors", ("reference", "representation", "trunk", "head", "temporal"), SIMPLER),
     Named("A", "conditioning_factors", ("representation", "trunk"), SIMPLER),
     Named("A", "deployed_conventions", ("direct", "z_zero", "offset"), SIMPLER),
     Named("A", "chunked_baseline", ("chunked_bc",), SIMPLER, at_most=True),
@@ -199,10 +201,16 @@ def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:
     # Criteria are looked for among the limits alone: a section of that name would hide them.
     if "." in bound.place or bound.place in SHARED:
         value: Any = params
-        for part in bound.place.split("."):
+        *sections, name = bound.place.split(".")
+        if sections[-1:] == [CAUSE]:
+            stated = by_criterion(at(params, ".".join(sections)))
+            return [stated[name]] if name in stated else []
+        for part in (*sections, name):
             if not isinstance(value, Mapping) or part not in value:
                 return []
             value = value[part]
+        if bound.of is not None:
+            return [bound.of(value)]
         return list(value.values()) if isinstance(value, Mapping) else [value]
     section = params.get(stage_of(bound.gate))
     if not isinstance(section, Mapping):

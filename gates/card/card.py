@@ -13,7 +13,6 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from gates.card.envelope import Simulated, beyond_simulation
-from gates.card.names import says
 from gates.card.people import ID_FORM, PersonId
 from gates.card.windows import AbortWindow
 from gates.claim import CHECKPOINT_ONLY
@@ -22,6 +21,7 @@ from gates.floors import HARDEST_CONTACT_N
 from gates.overrides import is_said
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
+from genpolicy.contract.names import says
 from genpolicy.errors import RefusedError
 from genpolicy.evidence.failure_search.settings import SearchSettings
 from genpolicy.integrity.documents import canonical_json, parse_json

@@ -13,7 +13,6 @@ from typing import Any
 
 from gates.card.card import TrialCard, missing_fields, validity
 from gates.card.judge import CardGateSettings
-from gates.card.names import says
 from gates.card.people import (
     ALLOW_LIST,
     BE_AT_THE_STOP,
@@ -30,6 +29,7 @@ from gates.floors import HARDEST_CONTACT_N
 from gates.report import stage_of
 from gates.settings import read_params, read_settings
 from gates.stress.contact import untouched
+from genpolicy.contract.names import says
 from genpolicy.errors import ConfigError
 
 NONCE_BYTES = 16

@@ -6,17 +6,10 @@ person under five names that look alike would pass for five.
 
 import unicodedata
 
-BLANK = "\u115f\u1160\u3164\uffa0"
-"""Letters by their category, and fillers without a shape."""
+from genpolicy.contract.names import says
+
 ALIKE = ("LATIN", "CYRILLIC", "GREEK", "ARMENIAN", "CHEROKEE")
 """Scripts with letters that look like those of another; no word has letters of two of them."""
-
-
-def says(text: str) -> bool:
-    """Whether a text holds a letter or a digit, and nothing that is not seen."""
-    seen = [character for character in text if character not in "\n\t"]
-    kinds = {"Cf" if c in BLANK else unicodedata.category(c) for c in seen}
-    return any(kind[0] in "LN" for kind in kinds) and not kinds & {"Cf", "Cc", "Co", "Cn", "Cs"}
 
 
 def disguise(name: str) -> str:

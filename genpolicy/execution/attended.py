@@ -5,6 +5,7 @@ discarded. Nothing is passed by: what the person drives comes by `deliver_fallba
 same queue, checks, stub and supervisor, and no stop is cleared.
 """
 
+from genpolicy.contract.names import says
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import ExecutorMode
@@ -27,7 +28,7 @@ class AttendedExecutor(Executor):
         """
         now_ns = self._begin(now_s)
         called = self.mode is ExecutorMode.INTERVENTION
-        if not called or self.stub.supervisor.stopped or not person.strip():
+        if not called or self.stub.supervisor.stopped or not says(person):
             return False
         self.person = person
         self._journal.add("person", now_ns, {"stage": "took_over", "who": person})

@@ -12,11 +12,11 @@ NEVER_NS = -(1 << 62)
 
 def ns_or_none(time_s: object) -> int | None:
     """Whole nanoseconds of a time in s; None of what is no time, whatever it is."""
-    if isinstance(time_s, bool) or not isinstance(time_s, Real):
-        return None
     try:
+        if isinstance(time_s, bool) or not isinstance(time_s, Real):
+            return None
         scaled = float(time_s) * NS_PER_S
-    except OverflowError:
+    except Exception:  # of whatever it is, reading it may raise anything
         return None
     return round(scaled) if abs(scaled) < -NEVER_NS else None
 

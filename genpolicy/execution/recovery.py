@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
+from genpolicy.contract.names import says
 from genpolicy.errors import ContractError
 from genpolicy.execution.cell import (
     FALLBACK_HASH,
@@ -120,7 +121,7 @@ class Recovery:
             ContractError: Nobody was asked, or no person is named.
         """
         self._expect(RecoveryState.ASK_HUMAN)
-        if not person.strip():
+        if not says(person):
             self._refuse("a resolution without a person", "a person's name")
         self._go(now_s, RecoveryState.IDLE, f"resolved by {person}")
 
@@ -153,7 +154,7 @@ class Recovery:
         Raises:
             ContractError: No person is named.
         """
-        if not person.strip():
+        if not says(person):
             self._refuse("a reset without a person", "a person's name")
         self.failures = self.attempts = 0
         self._go(now_s, RecoveryState.IDLE, f"reset by {person}")

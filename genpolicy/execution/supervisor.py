@@ -12,6 +12,7 @@ from numbers import Real
 
 import numpy as np
 
+from genpolicy.contract.names import says
 from genpolicy.errors import ContractError
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
@@ -82,8 +83,7 @@ class Supervisor:
         """
         here_n = self._bears_n(phase)
         limit_n, self._before_n = min(here_n, self._before_n), here_n
-        # A force is a size: one that is negative, unknown or no number was not measured.
-        if isinstance(force_n, Real) and 0.0 <= force_n <= limit_n:
+        if _is_borne(force_n, limit_n):
             return False
         detail = f"{_text(force_n)} N {_text(phase)}"
         self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "force", detail)
@@ -117,7 +117,7 @@ class Supervisor:
         Raises:
             ContractError: No person is named.
         """
-        if not isinstance(person, str) or not person.strip():
+        if not says(person):
             raise ContractError(
                 where="supervisor reset",
                 found="a reset without a person",
@@ -178,6 +178,16 @@ class Supervisor:
     def _record(self, now_ns: int, event: str, detail: str) -> None:
         payload = {"event": event, "state": str(self.state), "detail": detail}
         self._journal.add("supervisor", now_ns, payload)
+
+
+def _is_borne(force_n: object, limit_n: float) -> bool:
+    """Whether it is a force within the limit. A negative, an unknown or a flag was not measured."""
+    try:
+        if type(force_n) in FLAGS or not isinstance(force_n, Real):
+            return False
+        return 0.0 <= float(force_n) <= limit_n
+    except Exception:  # of whatever it is, reading it may raise anything
+        return False
 
 
 def _text(value: object) -> str:

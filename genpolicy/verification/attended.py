@@ -13,6 +13,7 @@ from pathlib import Path
 
 from genpolicy.seeds import stream
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.names import is_a_name
 from genpolicy.verification.recovering import ABORTED, ASKED, IDLE, PERSON, STOPPED, Recovering
 
 Finding = tuple[str, str]
@@ -83,7 +84,7 @@ class Attended:
     def _person(self, m: Message) -> Iterator[Finding]:
         if m["stage"] == BEGINS:
             asked = self._recovering.state == ASKED and self._mode == CALLED
-            if self._who or not asked or not str(m["who"]).strip():
+            if self._who or not asked or not is_a_name(m["who"]):
                 yield "P8.take_over", f"{m['who']!r} takes over in mode {self._mode!r}."
             if self._stopped:
                 yield "P8.stop", f"{m['who']!r} takes over while a stop stands."

@@ -8,6 +8,7 @@ from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import Message
 from genpolicy.verification.moved import moved_m
+from genpolicy.verification.names import is_a_name
 from genpolicy.verification.recovering import Failed
 
 Finding = tuple[str, str]
@@ -270,7 +271,7 @@ class WorldView:
 
     def _supervise(self, m: Message) -> Iterator[Finding]:
         reset = m["event"] == "human_reset"
-        if reset and not str(m["detail"]).strip():
+        if reset and not is_a_name(m["detail"]):
             yield "P7.reset", "A stop is cleared without a person."
         now_stopped, stopping = m["state"] in STOP_STATES, m["event"] in STOPPING
         if m["state"] not in STATES or m["event"] not in EVENTS:

@@ -114,7 +114,8 @@ class Loop:
         return self._clock() - self._begin_s
 
     def _wait(self, due_s: float) -> None:
-        """Serve whoever says something until the next tick is due."""
+        """Hear the person, however late it is; serve whoever says something until the next tick."""
+        self._hear()
         if not self._believed:
             time.sleep(self._period_s)
             self._serve()
@@ -138,8 +139,8 @@ class Loop:
         inboxes = [inbox for inbox in (self._answers, self._operator) if not inbox.closed]
         return [self._admission.descriptor, *(inbox.descriptor for inbox in inboxes)]
 
-    def _serve(self) -> None:
-        """Read what there is; the person first."""
+    def _hear(self) -> None:
+        """Obey the person; where every tick is late there is no other time to."""
         session, now_s = self.session, self._now()
         for payload in self._operator.read():
             operator = read_operator(payload)
@@ -147,6 +148,11 @@ class Loop:
                 session.tally.dropped["operator_malformed"] += 1
             else:
                 session.obey(operator, now_s)
+
+    def _serve(self) -> None:
+        """Read what there is; the person first."""
+        self._hear()
+        session, now_s = self.session, self._now()
         for payload in self._answers.read():
             answer = read_answer(payload)
             if answer is None:

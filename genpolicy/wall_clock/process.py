@@ -21,6 +21,7 @@ from typing import Any
 from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.execution.nanoseconds import NEVER_NS
+from genpolicy.execution.supervisor import SupervisorState
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.tasks.api import Task, load_task
@@ -80,6 +81,7 @@ def main(arguments: Sequence[str] | None = None, *, clock: Clock = time.monotoni
         loop.run()
         _conclude(given.folder, request, loop, {"answers": answers, "operator": operator})
         over = session.ended or operator.closed or bool(session.journal.lost)
+        over = over or session.stub.supervisor.state is SupervisorState.EMERGENCY_STOP
         following = None if over else next(sessions, None)
         if following is None:
             return 0

@@ -104,8 +104,9 @@ def test_a_stop_is_reachable_from_every_state_and_sticky(recovery, state):
     recovery.trigger(101.0, "insert", "x")
     recovery.advance(150.0)
     assert recovery.state is S.STOPPED
-    with pytest.raises(ContractError, match="without a person"):
-        recovery.human_reset(1001.0, "")
+    for nobody in ("", "\u200b", "-"):
+        with pytest.raises(ContractError, match="without a person"):
+            recovery.human_reset(1001.0, nobody)
     recovery.human_reset(1001.0, "spotter")
     assert recovery.state is S.IDLE
 

@@ -2,6 +2,7 @@
 
 import ast
 import math
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,18 @@ def supervisor():
     return Supervisor(EXECUTION, Journal("s"))
 
 
+class Unreadable(float):
+    """A number of which nobody can say how large it is."""
+
+    def __float__(self):
+        raise ValueError("unreadable")
+
+
+def test_a_time_that_cannot_be_read_stands_in_the_way_of_no_stop(supervisor):
+    supervisor.emergency_stop(Unreadable(1.0))
+    assert supervisor.state == "emergency_stop"
+
+
 @pytest.mark.parametrize("force_n, phase, trips", [
     (20.0, "approach", False), (math.nextafter(20.0, 30.0), "approach", True),
     (40.0, "insert", False), (41.0, "insert", True), (0.1, "unknown phase", True),
@@ -32,6 +45,8 @@ def supervisor():
     (-math.inf, "insert", True), (None, "insert", True), ("5", "insert", True),
     (1j, "insert", True), (0.0, "insert", False), (0, "insert", False),
     (np.float32(1.0), "insert", False), (1.0, ["insert"], True), (1.0, None, True),
+    (False, "insert", True), (True, "insert", True), (np.bool_(False), "insert", True),
+    (Fraction(1, 2), "insert", False), (10**400, "insert", True), (Unreadable(1.0), "insert", True),
 ])  # fmt: skip
 def test_force_gate(supervisor, force_n, phase, trips):
     assert supervisor.observe_force(1.0, force_n, phase) is trips
@@ -191,7 +206,7 @@ def test_the_absence_of_a_collision_may_be_said_by_numpy(supervisor):
     assert supervisor.observe_collision(0.0, np.False_) is False and not supervisor.stopped
 
 
-@pytest.mark.parametrize("person", ["", " ", None, 3])
+@pytest.mark.parametrize("person", ["", " ", None, 3, "\u200b", "\u00ad", "-", "ann\u2060"])
 def test_nobody_clears_no_stop(supervisor, person):
     supervisor.emergency_stop(0.0)
     with pytest.raises(ContractError, match="without a person"):

@@ -8,6 +8,7 @@ from flows.workspace import merged
 from gates.asked_for import CHECKS_ASKED_FOR, INCIDENTS_ASKED_FOR, OF_TWO
 from gates.floors import BOUNDS
 from gates.need.settings import NeedSettings
+from gates.preregistration import CAUSE
 from gates.proof import SPECS, judge
 from gates.protection import (
     NAMED,
@@ -22,7 +23,7 @@ from gates.report import GATES, stage_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
-DEFAULTED = ("remedies", "conditioning_factors")
+DEFAULTED = ("remedies", "factors", "conditioning_factors")
 """Settings of Gate A with a default in code."""
 
 
@@ -33,7 +34,10 @@ def _put(params, bound, value):
         section = params
         for part in path:
             section = section.setdefault(part, {})
-        section[last] = value
+        if path[-1:] == [CAUSE]:
+            (section,) = [entries for entries in section.values() if last in entries]
+            value = [value, section[last][1]]
+        section[last] = [0, value] if bound.of and not isinstance(value, list) else value
         return
     for entries in params[f"gate_{bound.gate.lower()}"]["limits"].values():
         if bound.place in entries:
@@ -107,6 +111,7 @@ def test_the_refusal_of_a_list_says_what_is_wrong_with_it(named):
 def test_golden_what_each_list_must_or_may_name():
     assert {(n.gate, n.place, n.names, n.at_most) for n in NAMED} == {
         ("A", "remedies", ("chunked_l1", "bc_noise"), False),
+        ("A", "factors", ("reference", "representation", "trunk", "head", "temporal"), False),
         ("A", "conditioning_factors", ("representation", "trunk"), False),
         ("A", "deployed_conventions", ("direct", "z_zero", "offset"), False),
         ("A", "chunked_baseline", ("chunked_bc",), True),
@@ -177,6 +182,9 @@ ASKED_FOR = {"stress": {"perturbations": {"push": {"contact_force_n": 30.0}, "re
 def test_a_protective_criterion_cannot_be_waived_but_what_a_task_lacks(bound, reason):
     """A waiver's reason may be the word that stands for a limit that follows from settings."""
     waived = {stage_of(bound.gate): {"not_applicable": {"safety": {bound.place: reason}}}}
+    if bound.waivable and bound.waivable(ASKED_FOR):  # no setting says that a task has it
+        assert require_protection({**ASKED_FOR, **waived}, bound.gate) == ()
+        return
     with pytest.raises(ConfigError, match=bound.place):
         require_protection({**ASKED_FOR, **waived}, bound.gate)
     rehearsed = require_protection({**ASKED_FOR, **waived, "rehearsal": True}, bound.gate)
@@ -216,7 +224,10 @@ def test_the_false_promotion_of_every_recovery_failed_is_not_two_lines_away(ladd
         ("D", "execution.force_limit_n", {"open": 40.0, "touch": 1e6}),
         ("D", "execution.maximum_age_s", {"default": 0.3, "insert": 5.0}),
         ("C", "execution.maximum_divergence_m", 9.0), ("D", "execution.maximum_scene_shift_m", 1.0),
-        ("A", "data_defects", 99),
+        ("A", "data_defects", 99), ("A", "label_disagreement", 1), ("A", "factor_valid_share", 1),
+        ("A", "gate_a.cause.swapped_columns", 99), ("A", "gate_a.cause.supported_share", 0),
+        ("A", "calibration_residual_m", 10), ("A", "mode_success_lower", 0),
+        ("D", "stress.planned_effect", [0.01, 0.99]),
         ("C", "feasibility.position_change_limit_m", 9.0), ("A", "cause_accepted", 0),
         ("D", "deadline_miss_upper", 0.9), ("D", "stress_success_lower", 0.0),
         ("D", "recovery_success_lower", 0.0), ("D", "latency_p95_s", 9.0),

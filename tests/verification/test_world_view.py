@@ -99,6 +99,9 @@ def test_a_stop_stays_until_a_person_clears_it(view):
     assert supervise("watchdog", "run") == ["P7.sticky"]
     assert supervise("force", "protective_stop") == []
     assert supervise("human_reset", "run", " ") == ["P7.reset"]
+    for nobody in ("\u200b", "-", ""):
+        assert supervise("force", "protective_stop") == []
+        assert supervise("human_reset", "run", nobody) == ["P7.reset"]
     assert rules(view) == ["P1.void"]  # seen before the stop
     observed(view, 1150)
     assert rules(view, condition_ns=1150 * MS) == []

@@ -1,11 +1,13 @@
 """What the supervisor's process refuses before it begins; the rest is asked of real processes."""
 
 import sys
+from types import SimpleNamespace
 
 import pytest
 from arranged import request_of, workspace
 
 from genpolicy.errors import ConfigError
+from genpolicy.execution.supervisor import SupervisorState
 from genpolicy.wall_clock import process as process_module
 from genpolicy.wall_clock.limits import read_limits
 
@@ -60,3 +62,31 @@ def test_nothing_is_written_before_it_is_allowed_to_begin(standing, tmp_path, ca
     assert begun(folder) == 2
     assert "as pinned" in capsys.readouterr().err
     assert sorted(path.name for path in folder.iterdir()) == ["request.json"]
+
+
+@pytest.mark.parametrize(("state", "played"), [
+    (SupervisorState.RUN, 2), (SupervisorState.PROTECTIVE_STOP, 2),
+    (SupervisorState.EMERGENCY_STOP, 1),
+])  # fmt: skip
+def test_behind_an_emergency_stop_no_replay_begins(state, played, tmp_path, monkeypatch):
+    """Each replay has a supervisor of its own, and only a person clears an E-stop."""
+    begun_with = []
+
+    def sessions(*_):
+        for number in range(2):
+            begun_with.append(number)
+            yield SimpleNamespace(
+                replay=[0], ended=False, journal=SimpleNamespace(lost=""),
+                stub=SimpleNamespace(supervisor=SimpleNamespace(state=state)),
+            )  # fmt: skip
+
+    for name, stands_in in {
+        "read_request": lambda _: SimpleNamespace(root=tmp_path), "read_limits": lambda _: None,
+        "_cell": lambda _: (None, None), "_sessions": sessions, "_conclude": lambda *_: None,
+        "Inbox": lambda _: SimpleNamespace(closed=False), "Outbox": lambda _: None,
+        "AdmissionThread": lambda _: None,
+        "Loop": lambda *_, **__: SimpleNamespace(run=lambda: None),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(process_module, name, stands_in)
+    assert begun(tmp_path) == 0
+    assert begun_with == list(range(played))
