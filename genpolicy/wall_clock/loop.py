@@ -115,7 +115,7 @@ class Loop:
 
     def _wait(self, due_s: float) -> None:
         """Hear the person, however late it is; serve whoever says something until the next tick."""
-        self._hear()
+        self._heed()
         if not self._believed:
             time.sleep(self._period_s)
             self._serve()
@@ -139,7 +139,7 @@ class Loop:
         inboxes = [inbox for inbox in (self._answers, self._operator) if not inbox.closed]
         return [self._admission.descriptor, *(inbox.descriptor for inbox in inboxes)]
 
-    def _hear(self) -> None:
+    def _heed(self) -> None:
         """Obey the person; where every tick is late there is no other time to."""
         session, now_s = self.session, self._now()
         for payload in self._operator.read():
@@ -151,7 +151,7 @@ class Loop:
 
     def _serve(self) -> None:
         """Read what there is; the person first."""
-        self._hear()
+        self._heed()
         session, now_s = self.session, self._now()
         for payload in self._answers.read():
             answer = read_answer(payload)
