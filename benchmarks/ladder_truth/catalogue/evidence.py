@@ -49,6 +49,26 @@ def _admissible(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(first_reason="", outcome="passed")
 
 
+def _never_valid(frame: pd.DataFrame) -> pd.DataFrame:
+    noisy = frame["method"] == "bc_noise"
+    columns = ("modes_covered", "admissible", "valid", "modes_valid", "fewest_admissible")
+    return frame.assign(**{name: frame[name].mask(noisy, 0) for name in columns})
+
+
+def _in_the_modes(frame: pd.DataFrame) -> pd.DataFrame:
+    flow = frame["method"] == "flow"
+    lost = ("between_modes", "far_from_modes")
+    frame = frame.assign(**{name: frame[name].mask(flow, 0) for name in lost})
+    whole = {name: frame[name].mask(flow, frame["samples"]) for name in ("admissible", "valid")}
+    each = frame["samples"] // frame["modes_present"]
+    return frame.assign(
+        **whole,
+        modes_covered=frame["modes_covered"].mask(flow, frame["modes_present"]),
+        modes_valid=frame["modes_valid"].mask(flow, frame["modes_present"]),
+        fewest_admissible=frame["fewest_admissible"].mask(flow, each),
+    )
+
+
 def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[~((frame["method"] == "flow") & (frame["start"] == 1))]
 
@@ -108,6 +128,17 @@ WRONGS = (
           "small",
           all_of(table("artifacts/stress/rollouts.parquet", _fewer_rollouts), committed("stress")),
           Expected("D", ("unmatched_starts",), refusal=r"rollout ")),
+    Wrong("a_remedy_is_never_valid", "evidence",
+          "Chunked BC with noise is written down as valid nowhere, and that is committed.",
+          "small",
+          all_of(table("artifacts/measure_baselines/modes.parquet", _never_valid),
+                 committed("measure_baselines")),
+          Expected("A", (), refusal=r"bc_noise \(seed 0\)")),
+    Wrong("every_sample_is_in_a_mode", "evidence",
+          "No sample of the flow lies between the modes, by its table, and that is committed.",
+          "small",
+          all_of(table("artifacts/reload/modes.parquet", _in_the_modes), committed("reload")),
+          Expected("B", (), refusal=r"flow \(seed 0\)")),
     Wrong("shadow_candidates_edited", "evidence",
           "Every shadow candidate is written down as admissible, and committed.",
           "small",

@@ -90,7 +90,8 @@ WRONGS = (
     Wrong("force_limit_upside_down", "supervisor",
           "The force gate trips below the limit, not above it.",
           "small",
-          patched(SUPERVISOR, ("0.0 <= force_n <= limit_n", "0.0 <= limit_n <= force_n")),
+          patched(SUPERVISOR, (
+              "0.0 <= float(force_n) <= limit_n", "0.0 <= limit_n <= float(force_n)")),
           Expected("A", refusal=PINNED)),
     Wrong("watchdog_sleeps", "supervisor", "The supervisor's watchdog never holds.",
           "small",

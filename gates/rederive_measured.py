@@ -1,0 +1,234 @@
+"""Which modes policies reach, measured again at a sample of situations.
+
+That a table is bound by hash says that nobody changed it behind the report. Here its numbers are
+held against the checkpoints that it speaks of: the same situations, the same names of the noise,
+the same six layers. The situations are drawn by the hash of the table, so that nobody who writes
+one can choose what is asked. Of who was brought answers are asked again elsewhere, and no modes.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gates.rederive_shadow import TaskSection
+from gates.report import Gate
+from gates.stated import device_of, mapping, refuse, section
+from genpolicy.candidates.judged import loaded_on, sampling_by
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import parse_settings
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.errors import BadInputError, IntegrityError
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
+from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.hashing import sha256_file
+from genpolicy.integrity.rows import read_rows
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import Policy
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.policies.validation_row import EARLIER_FOLDER
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import Task, load_task
+
+AUDIT = "artifacts/audit"
+DATASET = "artifacts/ingest"
+OF_A_TABLE = 16
+"""Situations at which every policy of a table is asked again."""
+EXACT = ("samples", "modes_present", "nfe")
+COUNTED = (
+    "modes_covered", "between_modes", "far_from_modes", "admissible", "valid", "modes_valid",
+    "fewest_admissible",
+)  # fmt: skip
+ROUNDED_SHARE = 0.02
+"""Of all samples of a policy that are asked again: how many another processor may put elsewhere.
+It draws the same within 1e-5, and a sample so near to a limit falls on its other side."""
+
+Row = ModeRow | FactorModeRow
+Place = tuple[str, int]
+"""Held-out episode and row."""
+Group = tuple[str, int, str]
+"""Method or variant, number of its training seed, and convention."""
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """What everybody is asked with."""
+
+    gate: Gate
+    root: Path
+    params: Mapping[str, Any]
+    data: Dataset
+    horizons: HorizonConfig
+    task: Task
+    checker: FeasibilityChecker
+
+    @classmethod
+    def of(cls, gate: Gate, root: Path, params: Mapping[str, Any]) -> "_Bench":
+        horizons = section(params, "horizons", HorizonConfig)
+        task = load_task(section(params, "task", TaskSection).name)
+        feasibility = section(params, "feasibility", FeasibilitySettings)
+        checker = make_checker(task, feasibility, action_period_s=horizons.action_period_s)
+        return cls(gate, root, params, load_dataset(root / DATASET), horizons, task, checker)
+
+    def number(self, name: str, key: str) -> int:
+        """A whole number of a section."""
+        return int(mapping(self.params.get(name)).get(key, 0))
+
+    def held_out(self, seen: int) -> HeldOut:
+        """Situations as a policy sees them that observes so many rows."""
+        horizons = self.horizons.model_copy(update={"observation_horizon": seen})
+        return held_out_situations(self.root / AUDIT, self.data, horizons=horizons)
+
+
+def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
+    """Measure what the policies of gates A and B reach again, at a sample of the situations.
+
+    Raises:
+        RefusedError: A policy that is judged has no rows, a situation lacks or stands twice, or
+            what a row counts is not what its checkpoint does there.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A file is missing, or is not what it claims to be.
+        BadInputError: A table cannot be read.
+    """
+    bench = _Bench.of(gate, root, params)
+    if gate == "A":
+        path, samples = (
+            "artifacts/measure_baselines/modes.parquet",
+            bench.number("measure_baselines", "samples"),
+        )
+        _hold(bench, path, ModeRow, _baselines(bench), lambda _: samples)
+        path, few = (
+            "artifacts/measure_factors/modes.parquet",
+            bench.number("measure_factors", "samples"),
+        )
+        _hold(bench, path, FactorModeRow, _variants(bench), lambda p: few if p.stochastic else 1)
+    if gate == "B":
+        samples = bench.number("reload", "samples")
+        path = "artifacts/reload/modes.parquet"
+        _hold(bench, path, ModeRow, _candidates(bench), lambda _: samples)
+        path = "artifacts/reload/modes_earlier.parquet"
+        _hold(bench, path, ModeRow, _candidates(bench, EARLIER_FOLDER), lambda _: samples)
+
+
+def _hold(
+    bench: _Bench,
+    path: str,
+    model: type[Row],
+    policies: Iterator[tuple[Group, NetworkPolicy]],
+    samples_of: Callable[[Policy], int],
+) -> None:
+    """Hold a table against everybody who was trained to stand in it."""
+    table = bench.root / path
+    stated = _by_group(bench.gate, read_rows(table, model))
+    for group, policy in policies:
+        own = stated.pop(group, {})
+        held_out = bench.held_out(policy.horizons.observation_horizon)
+        everywhere = {(s.episode_uuid, s.index) for s in held_out.situations}
+        for place in sorted(everywhere ^ own.keys()):
+            found = "no row" if place in everywhere else "a row"
+            wanted = f"one row of {path} for each situation that the audit names"
+            refuse(bench.gate, _of(group, place), found, wanted)
+        again = modes_of_policy(
+            policy, _some(held_out, table), seed=group[1], convention=group[2],
+            samples=samples_of(policy), task=bench.task, checker=bench.checker,
+        )  # fmt: skip
+        _compare(bench.gate, group, own, again)
+    brought = mapping(bench.params.get("candidates"))
+    for group in sorted(group for group in stated if group[0] not in brought):
+        refuse(bench.gate, _of(group), f"rows of {path}", "none: nobody of that name is judged")
+
+
+def _by_group(gate: Gate, rows: Sequence[Row]) -> dict[Group, dict[Place, Row]]:
+    found: dict[Group, dict[Place, Row]] = defaultdict(dict)
+    for row in rows:
+        name = row.variant if isinstance(row, FactorModeRow) else row.method
+        group, place = (name, row.seed, row.convention), (row.episode_uuid, row.index)
+        if place in found[group]:
+            refuse(gate, _of(group, place), "stated twice", "one row")
+        found[group][place] = row
+    return dict(found)
+
+
+def _baselines(bench: _Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
+    for method in mapping(mapping(bench.params.get("train_baselines")).get("samplers")):
+        for seed, own in _trained(bench, "train_baselines", method):
+            yield from _by_each(bench, method, seed, own)
+
+
+def _variants(bench: _Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
+    for variant in mapping(mapping(bench.params.get("train_factors")).get("variants")):
+        for seed, own in _trained(bench, "train_factors", variant):
+            yield from _by_each(bench, variant, seed, own)
+
+
+def _candidates(bench: _Bench, part: str = "") -> Iterator[tuple[Group, NetworkPolicy]]:
+    """Who was trained, by the weights of a part of the training."""
+    for method in mapping(mapping(bench.params.get("train_generators")).get("samplers")):
+        for seed, own in _trained(bench, "train_generators", method, part):
+            yield (method, seed, own.sampler.name), own
+
+
+def _trained(
+    bench: _Bench, stage: str, name: str, part: str = ""
+) -> Iterator[tuple[int, NetworkPolicy]]:
+    """Checkpoints of a name, by the number of their training seed."""
+    seeds = mapping(bench.params.get("policy")).get("seeds")
+    for seed in seeds if isinstance(seeds, list) else ():
+        place = f"artifacts/{stage}/{name}/seed_{seed}"
+        try:
+            own = loaded_on(device_of(bench.params), bench.root / place / part)
+        except (BadInputError, IntegrityError) as error:
+            refuse(bench.gate, place, str(error), "the checkpoint that was measured")
+        yield int(seed), own
+
+
+def _by_each(
+    bench: _Bench, name: str, seed: int, own: NetworkPolicy
+) -> Iterator[tuple[Group, NetworkPolicy]]:
+    """A checkpoint under its own sampler, and under each further one it is measured with."""
+    yield (name, seed, own.sampler.name), own
+    stated = mapping(mapping(bench.params.get("measure_baselines")).get("conventions"))
+    for convention, sampler in mapping(stated.get(own.method)).items():
+        where = f"measure_baselines.conventions.{own.method}.{convention}"
+        other = sampling_by(own, parse_settings(SamplerConfig, sampler, where=where))
+        yield (name, seed, convention), other
+
+
+def _some(held_out: HeldOut, table: Path) -> HeldOut:
+    """At most so many of the situations, by the hash of the table, in their order."""
+    generator = stream(0, "measured again", table.name, sha256_file(table))
+    count = len(held_out.situations)
+    chosen = np.sort(generator.choice(count, size=min(OF_A_TABLE, count), replace=False))
+    situations = tuple(held_out.situations[i] for i in chosen.tolist())
+    return HeldOut(situations, held_out.observations[chosen])
+
+
+def _compare(
+    gate: Gate, group: Group, stated: Mapping[Place, Row], again: Sequence[ModeRow]
+) -> None:
+    """Each row within a sample of what is found again, and all of a policy together nearly so."""
+    elsewhere = 0
+    for row in again:
+        place = (row.episode_uuid, row.index)
+        for column in (*EXACT, *COUNTED):
+            told, found = getattr(stated[place], column), getattr(row, column)
+            if abs(told - found) > (column in COUNTED):
+                expected = f"{found!r}, as its checkpoint does there"
+                refuse(gate, f"{_of(group, place)}: {column}", repr(told), expected)
+            elsewhere += abs(told - found)
+    bound = max(1.0, ROUNDED_SHARE * sum(row.samples for row in again))
+    if elsewhere > bound:
+        found = f"{elsewhere} counts otherwise at {len(again)} situations"
+        refuse(gate, f"{_of(group)}: modes", found, f"at most {bound:.3g}, what rounding explains")
+
+
+def _of(group: Group, place: Place | None = None) -> str:
+    name, seed, convention = group
+    where = "" if place is None else f" at {place[0]}, row {place[1]}"
+    return f"{name} (seed {seed}) by {convention}{where}"
