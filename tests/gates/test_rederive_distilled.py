@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gates import rederive
 from gates.proof import Rung
 from gates.rederive import rederived
 from gates.rederive_distilled import (
@@ -140,8 +141,9 @@ def test_both_witnesses_count_an_update_alike():
     assert GRADIENTS == distillation.GRADIENTS_PER_WINDOW
 
 
-def test_gate_b_is_refused_where_an_account_is_wrong(repo):
+def test_gate_b_is_refused_where_an_account_is_wrong(repo, monkeypatch):
     """Through the proof that `genpolicy verify report` makes."""
+    monkeypatch.setattr(rederive, "rederive_modes", lambda *_: None)  # nothing was trained here
     rung = Rung("B", "reproducibility", "PASS", "", "", "reports/gate_b.json", 0)
     assert rederived(repo, [rung])[0].verdict == "PASS"
     said = {"teacher": "diffusion", "teacher_sha256": "0", "updates": 1}
