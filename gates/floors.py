@@ -89,107 +89,92 @@ def _gain(effect: Any) -> Any:
         return effect
 
 
-def _need() -> list[Bound]:
-    """Limits of Gate A at which its question to the data, or to a simpler policy, says nothing."""
-    simple = "what is valid nine times of ten is the policy"
-    reversed_time = "no time goes back, and no column answers another's command"
-    unit = "a unit that is wrong differs by so much"
-    half = "who succeeds less often than it fails is no way to go"
-    faults = "a fault in one episode of ten is the data"
-    seen = "of so little nothing can be said"
-    return [
-        Bound("A", "mode_feasible_share", ">=", 0.5, "a mode refused as often as not is no target"),
-        Bound("A", "mode_success_lower", ">=", 0.3, half),
-        Bound("A", "mean_defeated_share", ">=", 0.3, "where the mean passes a point policy passes"),
-        Bound("A", "multimodal_situations", ">=", 10.0, seen),
-        Bound("A", "held_out_situations", ">=", 20.0, seen),
-        Bound(
-            "A",
-            "persistence_margin",
-            ">=",
-            0.02,
-            "an identity that shuffled time shows too is none",
-        ),
-        Bound("A", "chunking_valid_share", "<=", 0.9, simple),
-        Bound("A", "factor_valid_share", "<=", 0.9, simple),
-        Bound(
-            "A",
-            "baseline_mode_coverage",
-            "<=",
-            0.95,
-            "who keeps nearly every mode needs no density",
-        ),
-        Bound("A", "gate_a.cause.clock_disorder", "<=", 0.0, reversed_time),
-        Bound("A", "gate_a.cause.swapped_columns", "<=", 0.0, reversed_time),
-        Bound(
-            "A", "gate_a.cause.rate_deviation", "<=", 0.5, "rows at another rate are other actions"
-        ),
-        Bound("A", "gate_a.cause.frozen_s", "<=", 2.0, "nobody acts on what was seen so long ago"),
-        Bound("A", "gate_a.cause.gap_share", "<=", 0.1, "every chunk of 16 would hold a gap"),
-        Bound(
-            "A",
-            "gate_a.cause.jitter_share",
-            "<=",
-            1.0,
-            "a row a period beside its time is the next row",
-        ),
-        Bound("A", "gate_a.cause.gain_factor", "<=", 10.0, unit),
-        Bound("A", "gate_a.cause.gain_epoch_factor", "<=", 1.5, "half as far again is another arm"),
-        Bound("A", "gate_a.cause.magnitude_factor", "<=", 10.0, unit),
-        Bound(
-            "A", "gate_a.cause.frame_angle_rad", "<=", 0.5, "axes turned by 30 degrees are others"
-        ),
-        Bound("A", "gate_a.cause.faulty_episodes_share", "<=", 0.1, faults),
-        Bound(
-            "A", "gate_a.cause.lag_drift_rows", "<=", 5.0, "a lag that drifts so far is two lags"
-        ),
-        Bound("A", "gate_a.cause.supported_episodes", ">=", 5.0, seen),
-        Bound("A", "gate_a.cause.supported_share", ">=", 0.05, seen),
-        Bound(
-            "A", "gate_a.cause.denial_share", ">=", 0.2, "modes are not denied where nobody looked"
-        ),
-        Bound(
-            "A", "clock_residual_s", "<=", 0.05, "rows of one time were seen at others", _may_lack
-        ),
-        Bound(
-            "A",
-            "calibration_residual_m",
-            "<=",
-            0.02,
-            "what is held misses what it is to meet",
-            _may_lack,
-        ),
-        Bound(
-            "A", "lag_spread_rows", "<=", 2.0, "epochs two actions apart are two robots", _may_lack
-        ),
-        Bound(
-            "A",
-            "label_disagreement",
-            "<=",
-            0.3,
-            "labels wrong once in three teach failures",
-            _may_lack,
-        ),
-        Bound(
-            "A",
-            "strata_effect",
-            "<=",
-            0.7,
-            "who is right 17 times of 20 has seen the choice",
-            _may_lack,
-        ),
-        Bound(
-            "A", "phase_collapse_share", "<=", 0.8, "what the phase decides is no choice", _may_lack
-        ),
-        Bound(
-            "A",
-            "latent_dependence_p",
-            "<=",
-            0.2,
-            "a style by chance once in five is no strategy",
-            _may_lack,
-        ),
-    ]
+SIMPLE = "what is valid nine times of ten is the policy"
+REVERSED = "no time goes back, and no column answers another's command"
+UNIT = "a unit that is wrong differs by so much"
+HALF = "who succeeds less often than it fails is no way to go"
+FAULTS = "a fault in one episode of ten is the data"
+TOO_LITTLE = "of so little nothing can be said"
+NEED: tuple[Bound, ...] = (
+    Bound("A", "mode_feasible_share", ">=", 0.5, "a mode refused as often as not is no target"),
+    Bound("A", "mode_success_lower", ">=", 0.3, HALF),
+    Bound("A", "mean_defeated_share", ">=", 0.3, "where the mean passes a point policy passes"),
+    Bound("A", "multimodal_situations", ">=", 10.0, TOO_LITTLE),
+    Bound("A", "held_out_situations", ">=", 20.0, TOO_LITTLE),
+    Bound(
+        "A",
+        "persistence_margin",
+        ">=",
+        0.02,
+        "an identity that shuffled time shows too is none",
+    ),
+    Bound("A", "chunking_valid_share", "<=", 0.9, SIMPLE),
+    Bound("A", "factor_valid_share", "<=", 0.9, SIMPLE),
+    Bound(
+        "A",
+        "baseline_mode_coverage",
+        "<=",
+        0.95,
+        "who keeps nearly every mode needs no density",
+    ),
+    Bound("A", "gate_a.cause.clock_disorder", "<=", 0.0, REVERSED),
+    Bound("A", "gate_a.cause.swapped_columns", "<=", 0.0, REVERSED),
+    Bound("A", "gate_a.cause.rate_deviation", "<=", 0.5, "rows at another rate are other actions"),
+    Bound("A", "gate_a.cause.frozen_s", "<=", 2.0, "nobody acts on what was seen so long ago"),
+    Bound("A", "gate_a.cause.gap_share", "<=", 0.1, "every chunk of 16 would hold a gap"),
+    Bound(
+        "A",
+        "gate_a.cause.jitter_share",
+        "<=",
+        1.0,
+        "a row a period beside its time is the next row",
+    ),
+    Bound("A", "gate_a.cause.gain_factor", "<=", 10.0, UNIT),
+    Bound("A", "gate_a.cause.gain_epoch_factor", "<=", 1.5, "half as far again is another arm"),
+    Bound("A", "gate_a.cause.magnitude_factor", "<=", 10.0, UNIT),
+    Bound("A", "gate_a.cause.frame_angle_rad", "<=", 0.5, "axes turned by 30 degrees are others"),
+    Bound("A", "gate_a.cause.faulty_episodes_share", "<=", 0.1, FAULTS),
+    Bound("A", "gate_a.cause.lag_drift_rows", "<=", 5.0, "a lag that drifts so far is two lags"),
+    Bound("A", "gate_a.cause.supported_episodes", ">=", 5.0, TOO_LITTLE),
+    Bound("A", "gate_a.cause.supported_share", ">=", 0.05, TOO_LITTLE),
+    Bound("A", "gate_a.cause.denial_share", ">=", 0.2, "modes are not denied where nobody looked"),
+    Bound("A", "clock_residual_s", "<=", 0.05, "rows of one time were seen at others", _may_lack),
+    Bound(
+        "A",
+        "calibration_residual_m",
+        "<=",
+        0.02,
+        "what is held misses what it is to meet",
+        _may_lack,
+    ),
+    Bound("A", "lag_spread_rows", "<=", 2.0, "epochs two actions apart are two robots", _may_lack),
+    Bound(
+        "A",
+        "label_disagreement",
+        "<=",
+        0.3,
+        "labels wrong once in three teach failures",
+        _may_lack,
+    ),
+    Bound(
+        "A",
+        "strata_effect",
+        "<=",
+        0.7,
+        "who is right 17 times of 20 has seen the choice",
+        _may_lack,
+    ),
+    Bound("A", "phase_collapse_share", "<=", 0.8, "what the phase decides is no choice", _may_lack),
+    Bound(
+        "A",
+        "latent_dependence_p",
+        "<=",
+        0.2,
+        "a style by chance once in five is no strategy",
+        _may_lack,
+    ),
+)
+"""Limits of Gate A at which its question to the data, or to a simpler policy, says nothing."""
 
 
 def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
@@ -221,7 +206,7 @@ BOUNDS: tuple[Bound, ...] = (
     Bound("A", "remedy_valid_share", "<=", 0.9, "what is valid nine times of ten is the policy"),
     *_counts("A", "what nobody asked reads like a good answer", "unasked_checks"),
     *_counts("A", "two factors changed at once separate nothing", "factors_isolated"),
-    *_need(),
+    *NEED,
     *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
     *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
     *_counts("B", "numbers that mean something else command something else", "conformance"),
