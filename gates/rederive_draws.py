@@ -135,7 +135,7 @@ def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
             moments[row.method].setdefault((row.fixture, row.observation), []).append(row)
     asked: dict[str, list[Asked]] = {}
     for method, of_method in moments.items():
-        chosen = _some(sorted(of_method), OF_A_METHOD, root / SHADOW / "journal.mcap")
+        chosen = some(sorted(of_method), OF_A_METHOD, root / SHADOW / "journal.mcap")
         rows = [row for moment in chosen for row in of_method[moment]]
         asked[method] = [_of_row(data, horizons, row) for row in rows]
     _draw_again("C", root, params, asked, samples=shadow.samples, joining=REPLACING, always=True)
@@ -149,11 +149,11 @@ def _of_either(drawn: Sequence[Drawn], path: Path) -> list[Drawn]:
     kinds = [[one for one in drawn if (one.actions is None) is hidden] for hidden in (False, True)]
     numbered, hashed = kinds
     count = max(OF_A_JOURNAL - len(hashed), OF_A_JOURNAL // 2)
-    chosen = list(_some(numbered, count, path))
-    return [*chosen, *_some(hashed, OF_A_JOURNAL - len(chosen), path)]
+    chosen = list(some(numbered, count, path))
+    return [*chosen, *some(hashed, OF_A_JOURNAL - len(chosen), path)]
 
 
-def _some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:
+def some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:
     """At most so many of the items, by the hash of a file, in their order."""
     generator = stream(0, "drawn again", path.name, sha256_file(path))
     chosen = generator.choice(len(items), size=min(count, len(items)), replace=False)

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from gates.rederive_draws import some
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import device_of, mapping, refuse, section
-from genpolicy.candidates.judged import loaded_on, sampling_by
+from genpolicy.candidates.judged import candidates_of, loaded_on, sampling_by
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import Dataset, load_dataset
@@ -27,13 +26,11 @@ from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.validation_row import EARLIER_FOLDER
-from genpolicy.seeds import stream
 from genpolicy.tasks.api import Task, load_task
 
 AUDIT = "artifacts/audit"
@@ -98,16 +95,12 @@ def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
     """
     bench = _Bench.of(gate, root, params)
     if gate == "A":
-        path, samples = (
-            "artifacts/measure_baselines/modes.parquet",
-            bench.number("measure_baselines", "samples"),
-        )
+        samples = bench.number("measure_baselines", "samples")
+        path = "artifacts/measure_baselines/modes.parquet"
         _hold(bench, path, ModeRow, _baselines(bench), lambda _: samples)
-        path, few = (
-            "artifacts/measure_factors/modes.parquet",
-            bench.number("measure_factors", "samples"),
-        )
-        _hold(bench, path, FactorModeRow, _variants(bench), lambda p: few if p.stochastic else 1)
+        few = bench.number("measure_factors", "samples")
+        path = "artifacts/measure_factors/modes.parquet"
+        _hold(bench, path, FactorModeRow, _variants(bench), lambda p: candidates_of(p, few))
     if gate == "B":
         samples = bench.number("reload", "samples")
         path = "artifacts/reload/modes.parquet"
@@ -126,16 +119,21 @@ def _hold(
     """Hold a table against everybody who was trained to stand in it."""
     table = bench.root / path
     stated = _by_group(bench.gate, read_rows(table, model))
+    by_horizon: dict[int, tuple[HeldOut, HeldOut]] = {}
     for group, policy in policies:
         own = stated.pop(group, {})
-        held_out = bench.held_out(policy.horizons.observation_horizon)
+        seen = policy.horizons.observation_horizon
+        if seen not in by_horizon:
+            whole = bench.held_out(seen)
+            by_horizon[seen] = whole, _some_of(whole, table)
+        held_out, asked = by_horizon[seen]
         everywhere = {(s.episode_uuid, s.index) for s in held_out.situations}
         for place in sorted(everywhere ^ own.keys()):
             found = "no row" if place in everywhere else "a row"
             wanted = f"one row of {path} for each situation that the audit names"
             refuse(bench.gate, _of(group, place), found, wanted)
         again = modes_of_policy(
-            policy, _some(held_out, table), seed=group[1], convention=group[2],
+            policy, asked, seed=group[1], convention=group[2],
             samples=samples_of(policy), task=bench.task, checker=bench.checker,
         )  # fmt: skip
         _compare(bench.gate, group, own, again)
@@ -192,20 +190,19 @@ def _by_each(
     bench: _Bench, name: str, seed: int, own: NetworkPolicy
 ) -> Iterator[tuple[Group, NetworkPolicy]]:
     """A checkpoint under its own sampler, and under each further one it is measured with."""
-    yield (name, seed, own.sampler.name), own
     stated = mapping(mapping(bench.params.get("measure_baselines")).get("conventions"))
+    samplers: dict[str, SamplerConfig] = {own.sampler.name: own.sampler}
     for convention, sampler in mapping(stated.get(own.method)).items():
         where = f"measure_baselines.conventions.{own.method}.{convention}"
-        other = sampling_by(own, parse_settings(SamplerConfig, sampler, where=where))
-        yield (name, seed, convention), other
+        samplers[convention] = parse_settings(SamplerConfig, sampler, where=where)
+    for convention, config in samplers.items():
+        yield (name, seed, convention), sampling_by(own, config)
 
 
-def _some(held_out: HeldOut, table: Path) -> HeldOut:
+def _some_of(held_out: HeldOut, table: Path) -> HeldOut:
     """At most so many of the situations, by the hash of the table, in their order."""
-    generator = stream(0, "measured again", table.name, sha256_file(table))
-    count = len(held_out.situations)
-    chosen = np.sort(generator.choice(count, size=min(OF_A_TABLE, count), replace=False))
-    situations = tuple(held_out.situations[i] for i in chosen.tolist())
+    chosen = list(some(range(len(held_out.situations)), OF_A_TABLE, table))
+    situations = tuple(held_out.situations[i] for i in chosen)
     return HeldOut(situations, held_out.observations[chosen])
 
 

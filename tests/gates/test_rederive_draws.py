@@ -174,12 +174,12 @@ def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
 
 def test_which_are_drawn_again_follows_from_the_journal_and_is_bounded(journals, tmp_path):
     def chosen(path):
-        return list(module._some(range(1000), 12, path))
+        return list(module.some(range(1000), 12, path))
 
     assert chosen(journals[0]) == chosen(journals[0]) and len(chosen(journals[0])) == 12
     assert chosen(journals[0]) != chosen(journals[1])
-    assert list(module._some(range(3), 12, journals[0])) == [0, 1, 2]
-    assert list(module._some([], 12, journals[0])) == []
+    assert list(module.some(range(3), 12, journals[0])) == [0, 1, 2]
+    assert list(module.some([], 12, journals[0])) == []
 
 
 @pytest.fixture(scope="module")

@@ -119,7 +119,8 @@ def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None
         ),
         (lambda t: t["controller"]["lag_spread_rows"].pop(), "controller.lag_spread_rows is [1]"),
         (lambda t: t.update(me={"lag_spread_rows": [1, "r"]}), "gate_a.limits.me is no owner"),
-        (lambda t: t["controller"].update(lag_spread_rows=["1", "r"]), "lag_spread_rows"),
+        (lambda t: t["controller"].update(lag_spread_rows=["1", "r"]),
+         "gate_a: lag_spread_rows is '1', expected <= 2"),
         (lambda t: t["controller"].update(lag_spread_rows=[float("nan"), "r"]), "lag_spread"),
     ],
 )  # fmt: skip
