@@ -20,6 +20,7 @@ from gates.doubts_of_evidence import (
     not_testable,
     not_visited,
     one_seed,
+    open_columns,
     simpler_rule,
     untried,
 )
@@ -174,6 +175,7 @@ def _the_worst(caveat: str) -> str:
 RULES: Sequence[Callable[[GateReport], Iterator[Doubt]]] = (
     _not_measured,
     _not_decided,
+    open_columns,
     never_exercised,
     not_visited,
     not_testable,

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 from gates.claim import MEDIAN_PASSES, SHOWN, trainings
 from gates.doubt import Doubt, about, named
+from gates.feasibility.candidates import NEVER_ASKED
+from gates.need.conditioning import OPEN_COLUMNS
 from gates.report import Answer, GateReport
 from gates.reproducibility.timing import DECLARED
 from gates.stress.contact import UNTOUCHED
@@ -51,9 +53,28 @@ def never_exercised(report: GateReport) -> Iterator[Doubt]:
         if untried(answer).endswith("exercised"):
             kind = "hardly exercised" if untried(answer).startswith("h") else "never exercised"
             yield about(report, kind, answer)
+        unasked = answer.caveat.partition(NEVER_ASKED)[2]
+        if unasked:
+            text = (
+                "each was refused, and for another reason than its own every time, so that the "
+                f"check that it is made for had nothing to say: {named(unasked.split(', '))}"
+            )
+            yield about(report, "never exercised", answer, text)
     for caveat in report.caveats:
         if found := UNTOUCHED.match(caveat):
             yield Doubt(report.gate, "never exercised", caveat, (), found[1])
+
+
+def open_columns(report: GateReport) -> Iterator[Doubt]:
+    """Of many recorded columns only the best is held to the limit; others may tell as much."""
+    for answer in report.criteria:
+        columns = answer.caveat.partition(OPEN_COLUMNS)[2]
+        if columns and answer.verdict == "PASS":
+            text = (
+                f"not decided of {named(columns.split(', '))}: of all columns only the best is "
+                "held to the limit, where it beats a guess"
+            )
+            yield about(report, "not decided", answer, text)
 
 
 def not_visited(report: GateReport) -> Iterator[Doubt]:

@@ -32,6 +32,8 @@ ADMISSIBLE = (is_one("outcome", PASSED), *(is_one(layer, True) for layer in LAYE
 """Of a candidate that passed all six layers."""
 HELD_OUT_ROWS = Subset(CANDIDATES, (is_one("fixture", HELD_OUT),))
 CORRUPTED_ROWS = Subset(CANDIDATES, (is_none("fixture", *INTACT),))
+NEVER_ASKED = "never for its own: "
+"""In the caveat that names corruptions whose own check refused none of a candidate's chunks."""
 REFUSED_BY_NAME = (NotAll(ADMISSIBLE), is_one("first_reason", *REASONS))
 
 
@@ -230,6 +232,8 @@ def corrupted_refused_share(
     )
     own = rows["first_reason"] == rows["fixture"].map(REFUSED_FOR)
     text += f"; {int((refused & ~own).sum())} refused for another reason than their fixture's own"
+    never = sorted(set(rows["fixture"]) - set(rows.loc[own, "fixture"]))
+    text += f"; {NEVER_ASKED}{', '.join(never)}" if never else ""
     counted = f"{refused.sum()} of {len(rows)} candidates"
     recount = CORRUPTED_ROWS.counted(rows, *REFUSED_BY_NAME)
     return Measured(float(refused.mean()), interval, text, counted=counted, recount=recount)

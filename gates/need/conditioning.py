@@ -6,13 +6,17 @@ import numpy as np
 
 from gates.bounds import counted_interval
 from gates.cause import CauseName
-from gates.cause.told import counts
+from gates.cause.told import COLUMNS, counts, surely
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, numbers
 from gates.need.cause import as_the_cause, found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from gates.words import percent
 from genpolicy.audit.documents import SUMMARY
 from genpolicy.audit.rows import Prediction
+
+OPEN_COLUMNS = "not decided, and not held to the limit: "
+"""In the caveat that names recorded columns whose intervals lie astride the limit."""
 
 
 @criterion(
@@ -42,8 +46,9 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     records = frame[names].to_dict("records")
     rows = [Prediction(**{str(name): value for name, value in row.items()}) for row in records]
     frame = frame[[counts(row, rows, least) for row in rows]]
+    alone = _open_columns(rows, least)
     if rows and frame.empty:
-        return Measured(0.0, caveat="by itself no recorded column beats a guess")
+        return Measured(0.0, caveat=f"by itself no recorded column beats a guess{alone}")
     lower, upper = numbers(frame, "told_lower"), numbers(frame, "told_upper")
     beyond = bool(np.any(lower > least))
     row = int(np.argmax(lower if beyond else upper))
@@ -54,9 +59,24 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     if beyond:
         return Measured(interval[0], interval, f"{text}; lower end", counted=counted)
     if least - interval[1] >= 0:
-        return Measured(interval[1], interval, f"{text}; upper end", counted=counted)
+        return Measured(interval[1], interval, f"{text}; upper end{alone}", counted=counted)
     text = f"not decided: the limit lies inside the interval of {text}"
     return Measured(None, interval, text, counted=counted)
+
+
+def _open_columns(rows: list[Prediction], limit: float) -> str:
+    """Recorded columns that may tell too much, and are not held to the limit.
+
+    Of many columns an interval reaches beyond the limit now and then, so that none is held to it
+    by itself, nor the best of all where that beats no guess; whoever signs is told which they are.
+    """
+    open_ = [row for row in rows if surely(row, limit) is None and not counts(row, rows, limit)]
+    told = []
+    for row in sorted(open_, key=lambda row: (-row.told_upper, row.variable, row.phase)):
+        who = "the best of all" if row.variable == COLUMNS else row.variable
+        ends = f"{percent(row.told_lower)} to {percent(row.told_upper)}"
+        told.append(f"{who} in {row.phase} ({ends})")
+    return f"; {OPEN_COLUMNS}{', '.join(told)}" if told else ""
 
 
 @criterion(

@@ -7,7 +7,7 @@ from gates.criterion import criteria_of
 from gates.engine import GateSpec, Judged
 from gates.evidence import MissingEvidenceError
 from gates.more import hardly_decided
-from gates.need import conditioning, modes, semantics, simpler
+from gates.need import conditioning, kept, modes, semantics, simpler
 from gates.need.cause import asked, found_cause
 from gates.need.settings import (
     AUDIT,
@@ -40,7 +40,7 @@ SIMPLER_ASKED = frozenset(
         simpler.chunking_valid_share,
         simpler.remedy_valid_share,
         simpler.factor_valid_share,
-        simpler.baseline_mode_coverage,
+        kept.baseline_mode_coverage,
     )
 )
 TRAINED_ASKED = SIMPLER_ASKED | {simpler.latent_dependence_p.id}
@@ -78,7 +78,9 @@ def _beside(judged: Judged) -> tuple[str, ...]:
 GATE = GateSpec(
     gate="A",
     settings=NeedSettings,
-    criteria=criteria_of(vars(semantics), vars(modes), vars(conditioning), vars(simpler)),
+    criteria=criteria_of(
+        vars(semantics), vars(modes), vars(conditioning), vars(simpler), vars(kept)
+    ),
     bind=(
         "artifacts/ingest/frames.parquet",
         "artifacts/ingest/episodes.parquet",

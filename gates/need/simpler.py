@@ -13,7 +13,7 @@ import pandas as pd
 from gates.bounds import counted_interval, share_interval
 from gates.claim import SHOWN, trainings
 from gates.criterion import Measured, criterion
-from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.held import require_asked, require_latent, require_variant, unmatched_baselines
 from gates.need.settings import (
     MEASURED,
@@ -293,48 +293,3 @@ def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:
     if not variants:
         raise MissingEvidenceError(f"{TRAINED_FACTORS}/{VARIANTS.file} lists no variants")
     return variants
-
-
-@criterion(
-    "<=",
-    question="Does the best simple policy lose modes?",
-    look_at="Baselines: a simple policy already covers the modes; keep it.",
-)
-def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Mode coverage of the best baseline as it is deployed; a mode counts by admissible samples.
-
-    What a baseline covers when its latent is drawn stands in the caveat: drawn from, it is a
-    generator itself and has to pass the gates like any other candidate. Wide scatter reaches
-    modes by chance, so the share of its samples that pass all six layers stands beside it.
-    """
-    deployed: list[tuple[float, str]] = []
-    drawn: list[tuple[float, str]] = []
-    admissible: dict[str, float] = {}
-    situations: dict[str, int] = {}
-    for method in settings.baselines:
-        rows = evidence.of(MODES, ModeRow, method)
-        require_asked(evidence, rows, method, settings, table=MODES)
-        rows = rows[numbers(rows, "modes_present") >= 2]
-        generative = method in settings.generative_baselines
-        if not (generative or rows["convention"].isin(settings.deployed_conventions).any()):
-            raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
-        share = counts(rows, "modes_valid") / numbers(rows, "modes_present")
-        means = rows.assign(share=share).groupby("convention")["share"].mean()
-        for name, value in means.items():
-            fixed = name in settings.deployed_conventions and not generative
-            into = deployed if fixed else drawn
-            into.append((float(value), f"{method}, {name}"))
-            own = rows[rows["convention"] == name]
-            situations[f"{method}, {name}"] = len(own)
-            passed = numbers(own, "admissible").sum() / numbers(own, "samples").sum()
-            admissible[f"{method}, {name}"] = float(passed)
-    if not deployed:
-        raise MissingEvidenceError("no baseline is judged as it is deployed")
-    best, name = max(deployed)
-    text = f"best of {len(deployed)} deployed conventions, by {name}"
-    if drawn:
-        text += "; drawn at random, as a generator: " + ", ".join(
-            f"{who} {percent(value)} ({percent(admissible[who])} of its samples admissible)"
-            for value, who in sorted(drawn, reverse=True)
-        )
-    return Measured(best, caveat=text, counted=f"{situations[name]} situations")

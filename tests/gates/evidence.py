@@ -18,6 +18,7 @@ import yaml
 from watched import write_watched
 
 from gates import pipeline
+from gates.asked_for import REFUSED_FOR
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
@@ -1453,6 +1454,7 @@ def _candidates_drawn(root: Path) -> None:
 
 def _candidate(method: str, fixture: str, observation: int, candidate: int) -> dict[str, Any]:
     held = fixture in ("held_out", "two_modes")
+    broken = "joint_jerk" if candidate else REFUSED_FOR.get(fixture, "joint_jerk")
     layers: dict[str, Any] = dict.fromkeys(LAYERS, True)
     if not held:
         layers.update(dynamic=False, contact=None, fresh=None)
@@ -1467,7 +1469,7 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "mode": ("left", "right")[candidate % 2],
         **layers,
         "outcome": "passed" if held else "failed",
-        "first_reason": "" if held else "joint_jerk",
+        "first_reason": "" if held else broken,
         "first_row": None if held else 2,
         "layer_margin": 0.1,
         "margin_unit": "m" if held else "rad/s^3",

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from asked import asked, found_in
 
+from gates.doubts import doubts_of
 from gates.evidence import MissingEvidenceError
 from gates.feasibility.candidates import (
     admissible,
@@ -265,6 +266,26 @@ def test_a_reason_that_no_layer_knows_is_none(ladder):
     assert report.candidates == {"diffusion": "PASS", "flow": "FAIL"}
     found = {f.candidate: f for f in found_in(report, "corrupted_refused_share")}["flow"]
     assert "refused without reason: collision" in found.caveat
+
+
+def test_a_corruption_that_its_own_check_never_refused_was_never_exercised(ladder):
+    """A generator that always leaves the workspace is refused for that, whatever is broken."""
+
+    def outside(frame, fixtures):
+        some = of(frame) & frame["fixture"].isin(fixtures)
+        return frame.assign(first_reason=frame["first_reason"].mask(some, "workspace"))
+
+    def doubts(report):
+        mine = [d for d in doubts_of(report) if "corrupted_refused_share" in d.criteria]
+        return {(d.kind, d.candidate): d.text for d in mine}
+
+    before = doubts(judge(ladder, "C"))
+    evidence.edit_table(ladder, CANDIDATES, lambda f: outside(f, ["collision", "stale"]))
+    report = judge(ladder, "C")
+    assert report.verdict == "PASS"
+    added = {key: text for key, text in doubts(report).items() if key not in before}
+    assert set(added) == {("never exercised", "flow")}
+    assert "collision" in added["never exercised", "flow"]
 
 
 @pytest.mark.parametrize("name", ["projection_p95_m", "boundary_jerk_p95_m_s3"])

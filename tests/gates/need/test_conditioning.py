@@ -6,6 +6,7 @@ from asked import asked, settings_of
 from editing import cells
 
 from gates.cause import default_limits
+from gates.doubts import doubts_of
 from gates.evidence import MissingEvidenceError
 from gates.need import conditioning
 from gates.proof import judge
@@ -91,9 +92,27 @@ def test_of_several_recorded_columns_only_the_best_is_held_to_the_limit(ladder):
         return frame
 
     evidence.edit_table(ladder, "audit/predictions.parquet", change)
-    answers = {answer.id: answer for answer in judge(ladder, "A").criteria}
+    report = judge(ladder, "A")
+    answers = {answer.id: answer for answer in report.criteria}
     assert (answers["told_share"].measured, answers["told_share"].verdict) == (0.2, "PASS")
     assert answers["cause_accepted"].verdict == "PASS"
+    (open_,) = [doubt for doubt in doubts_of(report) if "told_share" in doubt.criteria]
+    assert open_.kind == "not decided" and "scenario in approach (-30 % to 60 %)" in open_.text
+
+
+def test_a_column_surely_below_the_limit_is_no_doubt(ladder):
+    """Nor is one that is held to the limit, and said there."""
+    names = ["variable", "told", "told_lower", "told_upper", "detail"]
+
+    def change(frame):
+        frame.loc[0, names] = ["scenario", 0.1, -0.3, 0.4, ""]
+        frame.loc[1, names] = ["recorded_columns", 0.05, -0.1, 0.2, "scenario"]
+        return frame
+
+    evidence.edit_table(ladder, "audit/predictions.parquet", change)
+    report = judge(ladder, "A")
+    kinds = {doubt.kind for doubt in doubts_of(report) if "told_share" in doubt.criteria}
+    assert "not decided" not in kinds
 
 
 def test_columns_that_beat_no_guess_take_no_wrong_guesses_away(ladder):
@@ -107,7 +126,11 @@ def test_columns_that_beat_no_guess_take_no_wrong_guesses_away(ladder):
 
     evidence.edit_table(ladder, "audit/predictions.parquet", change)
     found = asked(ladder, conditioning.told_share, gate="A")
-    assert (found.value, found.caveat) == (0.0, "by itself no recorded column beats a guess")
+    assert (found.value, found.caveat) == (
+        0.0,
+        "by itself no recorded column beats a guess; not decided, and not held to the limit: "
+        "scenario in approach (-30 % to 60 %), the best of all in approach (-10 % to 45 %)",
+    )
 
 
 @pytest.mark.parametrize(

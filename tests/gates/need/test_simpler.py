@@ -120,36 +120,6 @@ def test_only_conditioning_factors_can_remove_the_mean(ladder):
         assert found(ladder, "factor_valid_share").verdict == verdict, name
 
 
-def test_ibc_is_reported_beside_the_deployed_baselines_and_not_judged(ladder):
-    criterion = found(ladder, "baseline_mode_coverage")
-    assert criterion.measured == 0.0 and criterion.verdict == "PASS"
-    assert "ibc, derivative_free 100 % (100 % of its samples admissible)" in criterion.caveat
-    # A convention under which others are deployed does not make an energy deterministic.
-    evidence.edit_table(
-        ladder, "measure_baselines/modes.parquet", lambda f: f.assign(convention="direct")
-    )
-    assert found(ladder, "baseline_mode_coverage").measured == 0.0
-    evidence.write_params(ladder, lambda p: p["gate_a"].update(generative_baselines=[]))
-    assert found(ladder, "baseline_mode_coverage").measured == 1.0
-
-
-def test_all_that_are_drawn_at_random_are_told_and_the_best_comes_first(ladder):
-    """Each with its own coverage and its own share of what may be executed."""
-
-    def drawn(frame):
-        of = frame["method"] == "ibc"
-        other = {"modes_valid": 1, "admissible": frame["samples"][of] // 4}
-        more = [frame[of].assign(convention=name, **other) for name in ("langevin", "annealed")]
-        return pd.concat([*more, frame], ignore_index=True)
-
-    evidence.edit_table(ladder, "measure_baselines/modes.parquet", drawn)
-    assert found(ladder, "baseline_mode_coverage").caveat.endswith(
-        "; drawn at random, as a generator: ibc, derivative_free 100 % (100 % of its samples "
-        "admissible), ibc, langevin 50 % (25 % of its samples admissible), "
-        "ibc, annealed 50 % (25 % of its samples admissible)"
-    )
-
-
 def test_the_page_draws_the_factors_and_says_what_ibc_is(ladder):
     write_gate(ladder, "A")
     page = (ladder / "reports/gate_a.html").read_text()
@@ -252,19 +222,6 @@ def test_in_doubt_a_remedy_is_taken_to_be_valid_more_often(ladder):
     assert criterion.interval == pytest.approx(clopper_pearson(11, 30, 0.975))
 
 
-def test_noise_counts_as_a_simple_policy_and_only_by_what_may_be_executed(ladder):
-    def scatter(frame, **changes):
-        rows = frame["method"] == "bc_noise"
-        return frame.assign(**{k: np.where(rows, v, frame[k]) for k, v in changes.items()})
-
-    path = "measure_baselines/modes.parquet"
-    evidence.edit_table(ladder, path, lambda f: scatter(f, modes_covered=2))
-    assert found(ladder, "baseline_mode_coverage").measured == 0.0
-    evidence.edit_table(ladder, path, lambda f: scatter(f, modes_valid=2))
-    criterion = found(ladder, "baseline_mode_coverage")
-    assert criterion.verdict == "FAIL" and "by bc_noise, offset" in criterion.caveat
-
-
 def test_the_level_is_divided_among_as_many_as_could_look_valid(ladder):
     """Two remedies and two conditioning variants, none valid in 30 situations of 30 episodes."""
     for name in ("remedy_valid_share", "factor_valid_share"):
@@ -325,4 +282,3 @@ def test_a_situation_with_one_mode_asks_no_simple_policy(ladder):
     for name in ("remedy_valid_share", "chunking_valid_share"):
         criterion = found(ladder, name)
         assert criterion.recount.whole == 20 and criterion.interval[0] == 0.0
-    assert found(ladder, "baseline_mode_coverage").measured == 0.0
