@@ -7,6 +7,10 @@ from gates.report import Answer, GateReport
 
 MOST_NAMED = 3
 """Criteria that one doubt names; of more it says how many there are."""
+OPEN_COLUMNS = "not decided, and not held to the limit: "
+"""In the caveat that names recorded columns whose intervals lie astride the limit."""
+NEVER_ASKED = "never for its own: "
+"""In the caveat that names corruptions whose own check refused none of a candidate's chunks."""
 GAP = "\0"
 """In place of a name; no sentence holds one."""
 

@@ -8,9 +8,7 @@ import re
 from collections.abc import Iterator
 
 from gates.claim import MEDIAN_PASSES, SHOWN, trainings
-from gates.doubt import Doubt, about, named
-from gates.feasibility.candidates import NEVER_ASKED
-from gates.need.conditioning import OPEN_COLUMNS
+from gates.doubt import NEVER_ASKED, OPEN_COLUMNS, Doubt, about, named
 from gates.report import Answer, GateReport
 from gates.reproducibility.timing import DECLARED
 from gates.stress.contact import UNTOUCHED

@@ -57,6 +57,7 @@ MILDEST: tuple[Mildest, ...] = (
         {"probability": 0.02, "magnitude_s": 0.1},
         "a chunk that waits for less than two action periods is not overtaken",
     ),
+    Mildest("push", {"force_n": 5.0}, "a hand that leans on the arm pushes as hard"),
 )
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 from gates.asked_for import REFUSED_FOR
 from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.criterion import Measured, criterion
+from gates.doubt import NEVER_ASKED
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.feasibility.settings import (
     CANDIDATES,
@@ -32,8 +33,6 @@ ADMISSIBLE = (is_one("outcome", PASSED), *(is_one(layer, True) for layer in LAYE
 """Of a candidate that passed all six layers."""
 HELD_OUT_ROWS = Subset(CANDIDATES, (is_one("fixture", HELD_OUT),))
 CORRUPTED_ROWS = Subset(CANDIDATES, (is_none("fixture", *INTACT),))
-NEVER_ASKED = "never for its own: "
-"""In the caveat that names corruptions whose own check refused none of a candidate's chunks."""
 REFUSED_BY_NAME = (NotAll(ADMISSIBLE), is_one("first_reason", *REASONS))
 
 

@@ -8,15 +8,13 @@ from gates.bounds import counted_interval
 from gates.cause import CauseName
 from gates.cause.told import COLUMNS, counts, surely
 from gates.criterion import Measured, criterion
+from gates.doubt import OPEN_COLUMNS
 from gates.evidence import Evidence, numbers
 from gates.need.cause import as_the_cause, found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
 from gates.words import percent
 from genpolicy.audit.documents import SUMMARY
 from genpolicy.audit.rows import Prediction
-
-OPEN_COLUMNS = "not decided, and not held to the limit: "
-"""In the caveat that names recorded columns whose intervals lie astride the limit."""
 
 
 @criterion(

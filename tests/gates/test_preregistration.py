@@ -213,8 +213,8 @@ def test_what_moved_shows_in_the_report_of_the_gate_and_of_those_above(ladder, g
 
     def change(params):
         for own, name in OWN_LIMIT.items():
-            # Beyond these `gates.protection` refuses the limits of Gates A, B and D.
-            looser = {"A": 0.65, "B": 0.19, "D": 0.45}.get(own, 0.9)
+            # Beyond these `gates.protection` refuses the limits.
+            looser = {"A": 0.65, "B": 0.19, "C": 0.09, "D": 0.45}[own]
             evidence.set_limit(stage_of(own), name, looser)(params)
 
     evidence.write_params(ladder, change)

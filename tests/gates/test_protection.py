@@ -295,5 +295,6 @@ def test_the_shipped_ladder_keeps_every_bound_and_the_smoke_ladder_is_a_rehearsa
         "nominal_success_lower", "recovery_success_lower", "latency_p95_s", "force_peak_p95_n",
         "mode_coverage_lower", "outside_modes_upper", "late_change_upper", "baseline_fall_upper",
         "warm_latency_ratio_upper", "latency_model_ratio_upper", "mode_admissible_gap",
-        "remedy_valid_share",
+        "remedy_valid_share", "boundary_jerk_p95_m_s3", "cold_latency_ratio_upper",
+        "projection_p95_m",
     }  # fmt: skip

@@ -28,6 +28,7 @@ def test_golden_what_is_the_least():
         "policy_stall": {"probability": 0.02, "magnitude_s": 0.1},
         "network_jitter": {"probability": 0.2, "magnitude_s": 0.05},
         "queue_reorder": {"probability": 0.02, "magnitude_s": 0.1},
+        "push": {"force_n": 5.0},
     }
 
 
