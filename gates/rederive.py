@@ -22,8 +22,8 @@ from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
-from gates.rederive_measured import rederive_modes
 from gates.rederive_monitors import rederive_monitors
+from gates.rederive_policies import rederive_policies
 from gates.rederive_refused import rederive_refused
 from gates.rederive_searched import rederive_searched
 from gates.rederive_sessions import rederive_sessions
@@ -107,9 +107,9 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
-            planned, a chunk or a count of modes not what its checkpoint draws again, or a power,
-            a mutant, a statistic, a split or the cost of a distillation is not what is computed
-            again. Or a page or a file of rows says other than the report.
+            planned, a chunk, a mode, a fixture or a latent not what its checkpoint draws again, or
+            a power, a mutant, a statistic, a split or the cost of a distillation is not what is
+            computed again. Or a page or a file of rows says other than the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -125,7 +125,7 @@ def _evidence(root: Path, gate: Gate) -> None:
     params = read_params(root)
     if gate in TRAININGS:
         rederive_trainings(root, gate, params)
-        rederive_modes(gate, root, params)
+        rederive_policies(gate, root, params)
     if gate == "B":
         rederive_brought(root, params)
         rederive_conformance(root, params)

@@ -54,7 +54,7 @@ Group = tuple[str, int, str]
 
 
 @dataclass(frozen=True)
-class _Bench:
+class Bench:
     """What everybody is asked with."""
 
     gate: Gate
@@ -66,7 +66,8 @@ class _Bench:
     checker: FeasibilityChecker
 
     @classmethod
-    def of(cls, gate: Gate, root: Path, params: Mapping[str, Any]) -> "_Bench":
+    def of(cls, gate: Gate, root: Path, params: Mapping[str, Any]) -> "Bench":
+        """What the settings of a ladder say of it."""
         horizons = section(params, "horizons", HorizonConfig)
         task = load_task(section(params, "task", TaskSection).name)
         feasibility = section(params, "feasibility", FeasibilitySettings)
@@ -93,7 +94,7 @@ def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
         IntegrityError: A file is missing, or is not what it claims to be.
         BadInputError: A table cannot be read.
     """
-    bench = _Bench.of(gate, root, params)
+    bench = Bench.of(gate, root, params)
     if gate == "A":
         samples = bench.number("measure_baselines", "samples")
         path = "artifacts/measure_baselines/modes.parquet"
@@ -110,7 +111,7 @@ def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
 
 
 def _hold(
-    bench: _Bench,
+    bench: Bench,
     path: str,
     model: type[Row],
     policies: Iterator[tuple[Group, NetworkPolicy]],
@@ -153,41 +154,41 @@ def _by_group(gate: Gate, rows: Sequence[Row]) -> dict[Group, dict[Place, Row]]:
     return dict(found)
 
 
-def _baselines(bench: _Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
+def _baselines(bench: Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
     for method in mapping(mapping(bench.params.get("train_baselines")).get("samplers")):
-        for seed, own in _trained(bench, "train_baselines", method):
+        for seed, own in trained_in(bench, "train_baselines", method):
             yield from _by_each(bench, method, seed, own)
 
 
-def _variants(bench: _Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
+def _variants(bench: Bench) -> Iterator[tuple[Group, NetworkPolicy]]:
     for variant in mapping(mapping(bench.params.get("train_factors")).get("variants")):
-        for seed, own in _trained(bench, "train_factors", variant):
+        for seed, own in trained_in(bench, "train_factors", variant):
             yield from _by_each(bench, variant, seed, own)
 
 
-def _candidates(bench: _Bench, part: str = "") -> Iterator[tuple[Group, NetworkPolicy]]:
+def _candidates(bench: Bench, part: str = "") -> Iterator[tuple[Group, NetworkPolicy]]:
     """Who was trained, by the weights of a part of the training."""
     for method in mapping(mapping(bench.params.get("train_generators")).get("samplers")):
-        for seed, own in _trained(bench, "train_generators", method, part):
+        for seed, own in trained_in(bench, "train_generators", method, part):
             yield (method, seed, own.sampler.name), own
 
 
-def _trained(
-    bench: _Bench, stage: str, name: str, part: str = ""
+def trained_in(
+    bench: Bench, stage: str, name: str, part: str = ""
 ) -> Iterator[tuple[int, NetworkPolicy]]:
     """Checkpoints of a name, by the number of their training seed."""
-    seeds = mapping(bench.params.get("policy")).get("seeds")
+    device, seeds = device_of(bench.params), mapping(bench.params.get("policy")).get("seeds")
     for seed in seeds if isinstance(seeds, list) else ():
         place = f"artifacts/{stage}/{name}/seed_{seed}"
         try:
-            own = loaded_on(device_of(bench.params), bench.root / place / part)
+            own = loaded_on(device, bench.root / place / part)
         except (BadInputError, IntegrityError) as error:
             refuse(bench.gate, place, str(error), "the checkpoint that was measured")
         yield int(seed), own
 
 
 def _by_each(
-    bench: _Bench, name: str, seed: int, own: NetworkPolicy
+    bench: Bench, name: str, seed: int, own: NetworkPolicy
 ) -> Iterator[tuple[Group, NetworkPolicy]]:
     """A checkpoint under its own sampler, and under each further one it is measured with."""
     stated = mapping(mapping(bench.params.get("measure_baselines")).get("conventions"))

@@ -143,7 +143,7 @@ def test_both_witnesses_count_an_update_alike():
 
 def test_gate_b_is_refused_where_an_account_is_wrong(repo, monkeypatch):
     """Through the proof that `genpolicy verify report` makes."""
-    monkeypatch.setattr(rederive, "rederive_modes", lambda *_: None)  # nothing was trained here
+    monkeypatch.setattr(rederive, "rederive_policies", lambda *_: None)  # nothing was trained here
     rung = Rung("B", "reproducibility", "PASS", "", "", "reports/gate_b.json", 0)
     assert rederived(repo, [rung])[0].verdict == "PASS"
     said = {"teacher": "diffusion", "teacher_sha256": "0", "updates": 1}

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from ladder_workspace import edit_params, hashes, repro, set_limit
 
-from gates.rederive_measured import rederive_modes
+from gates.rederive_policies import rederive_policies
 from gates.report import Gate
 from genpolicy.errors import RefusedError
 
@@ -50,14 +50,15 @@ def test_the_ladder_runs_through_all_five_gates_and_waits_for_a_person(finished:
         ("A", "measure_factors/modes", "linear_encoder", "valid"),
         ("B", "reload/modes", "flow", "between_modes"),
         ("B", "reload/modes_earlier", "diffusion", "admissible"),
+        ("B", "train_generators/fixtures", "diffusion", "nfe"),
     ],
 )
-def test_counts_of_modes_are_those_that_the_checkpoints_give(
+def test_counts_are_those_that_the_checkpoints_give(
     copy: Path, gate: Gate, table: str, who: str, column: str
 ) -> None:
     """A forged row that is committed and judged was as good as a measured one."""
     params = yaml.safe_load((copy / "params.yaml").read_text())
-    rederive_modes(gate, copy, params)
+    rederive_policies(gate, copy, params)
     path = copy / "artifacts" / f"{table}.parquet"
     frame = pd.read_parquet(path)
     own = frame["variant" if "variant" in frame else "method"] == who
@@ -65,7 +66,7 @@ def test_counts_of_modes_are_those_that_the_checkpoints_give(
     frame[column] = frame[column].mask(own, (frame[column] + 5) % 16).astype(frame[column].dtype)
     frame.to_parquet(path)
     with pytest.raises(RefusedError, match=rf"{who} \(seed 0\)"):
-        rederive_modes(gate, copy, params)
+        rederive_policies(gate, copy, params)
 
 
 def test_a_second_repro_does_nothing(copy: Path) -> None:
