@@ -3,26 +3,33 @@
 That a table is bound by hash says that nobody changed it behind the report. Here its numbers are
 held against the checkpoints that it speaks of: the same situations, the same names of the noise,
 the same six layers. The situations are drawn by the hash of the table, so that nobody who writes
-one can choose what is asked. Of who was brought answers are asked again elsewhere, and no modes.
+one can choose what is asked. Who was brought is asked in a process of its own, as the stage did.
 """
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from gates.rederive_brought import brought_policy
+from gates.rederive_conformance import REPEATS
 from gates.rederive_draws import some
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
+from gates.reproducibility.settings import RELOAD
 from gates.stated import device_of, mapping, refuse, section
 from genpolicy.candidates.judged import candidates_of, loaded_on, sampling_by
+from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.conformance import CONFORMANCE
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
+from genpolicy.evidence.reproducibility.brought import UNSAID
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -37,7 +44,7 @@ AUDIT = "artifacts/audit"
 DATASET = "artifacts/ingest"
 OF_A_TABLE = 16
 """Situations at which every policy of a table is asked again."""
-EXACT = ("samples", "modes_present", "nfe")
+EXACT = ("samples", "modes_present")
 COUNTED = (
     "modes_covered", "between_modes", "far_from_modes", "admissible", "valid", "modes_valid",
     "fewest_admissible",
@@ -105,7 +112,7 @@ def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
     if gate == "B":
         samples = bench.number("reload", "samples")
         path = "artifacts/reload/modes.parquet"
-        _hold(bench, path, ModeRow, _candidates(bench), lambda _: samples)
+        _hold(bench, path, ModeRow, chain(_candidates(bench), _brought(bench)), lambda _: samples)
         path = "artifacts/reload/modes_earlier.parquet"
         _hold(bench, path, ModeRow, _candidates(bench, EARLIER_FOLDER), lambda _: samples)
 
@@ -114,16 +121,16 @@ def _hold(
     bench: Bench,
     path: str,
     model: type[Row],
-    policies: Iterator[tuple[Group, NetworkPolicy]],
+    policies: Iterator[tuple[Group, Policy | None]],
     samples_of: Callable[[Policy], int],
 ) -> None:
-    """Hold a table against everybody who was trained to stand in it."""
+    """Hold a table against everybody who has to stand in it; of None only that it does."""
     table = bench.root / path
     stated = _by_group(bench.gate, read_rows(table, model))
     by_horizon: dict[int, tuple[HeldOut, HeldOut]] = {}
     for group, policy in policies:
         own = stated.pop(group, {})
-        seen = policy.horizons.observation_horizon
+        seen = (policy or bench).horizons.observation_horizon
         if seen not in by_horizon:
             whole = bench.held_out(seen)
             by_horizon[seen] = whole, _some_of(whole, table)
@@ -133,13 +140,14 @@ def _hold(
             found = "no row" if place in everywhere else "a row"
             wanted = f"one row of {path} for each situation that the audit names"
             refuse(bench.gate, _of(group, place), found, wanted)
+        if policy is None:
+            continue
         again = modes_of_policy(
             policy, asked, seed=group[1], convention=group[2],
             samples=samples_of(policy), task=bench.task, checker=bench.checker,
         )  # fmt: skip
         _compare(bench.gate, group, own, again)
-    brought = mapping(bench.params.get("candidates"))
-    for group in sorted(group for group in stated if group[0] not in brought):
+    for group in sorted(stated):
         refuse(bench.gate, _of(group), f"rows of {path}", "none: nobody of that name is judged")
 
 
@@ -171,6 +179,25 @@ def _candidates(bench: Bench, part: str = "") -> Iterator[tuple[Group, NetworkPo
     for method in mapping(mapping(bench.params.get("train_generators")).get("samplers")):
         for seed, own in trained_in(bench, "train_generators", method, part):
             yield (method, seed, own.sampler.name), own
+
+
+def _brought(bench: Bench) -> Iterator[tuple[Group, Policy | None]]:
+    """Who was brought, one process after the other.
+
+    Who answers otherwise when asked again fails for that, and nothing of it can be asked again.
+    """
+    found = CONFORMANCE.read(bench.root / RELOAD)
+    scene, contract = bench.task.scene_path, bench.data.observation_contract
+    for name in mapping(bench.params.get("candidates")):
+        own = brought_policy(bench.root, bench.params, str(name))
+        assert own is not None  # it is one of the section
+        with running(own, contract, scene=scene) as policy:
+            declared = own.entry.declared
+            convention = declared.sampler if declared else UNSAID
+            group = own.name, own.seed, convention
+            told = found[own.name].findings if own.name in found else ()
+            again = not any(one.judged == "fails" for one in told if one.name in REPEATS)
+            yield group, policy if again else None
 
 
 def trained_in(
@@ -210,7 +237,10 @@ def _some_of(held_out: HeldOut, table: Path) -> HeldOut:
 def _compare(
     gate: Gate, group: Group, stated: Mapping[Place, Row], again: Sequence[ModeRow]
 ) -> None:
-    """Each row within a sample of what is found again, and all of a policy together nearly so."""
+    """Each row within a sample of what is found again, and all of a policy together nearly so.
+
+    Of evaluations it may state more: a solver that chooses its steps counts the most of a call.
+    """
     elsewhere = 0
     for row in again:
         place = (row.episode_uuid, row.index)
@@ -220,6 +250,9 @@ def _compare(
                 expected = f"{found!r}, as its checkpoint does there"
                 refuse(gate, f"{_of(group, place)}: {column}", repr(told), expected)
             elsewhere += abs(told - found)
+        if stated[place].nfe < row.nfe:
+            expected = f"{row.nfe} or more, as its checkpoint asks there"
+            refuse(gate, f"{_of(group, place)}: nfe", str(stated[place].nfe), expected)
     bound = max(1.0, ROUNDED_SHARE * sum(row.samples for row in again))
     if elsewhere > bound:
         found = f"{elsewhere} counts otherwise at {len(again)} situations"

@@ -42,13 +42,14 @@ def hold(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "modes_of_policy", again)
     bench = SimpleNamespace(
-        gate="A", root=tmp_path, params={"candidates": {"brought": "b.yaml"}}, task=None,
-        checker=None, held_out=lambda _: held_out,
+        gate="A", root=tmp_path, params={}, task=None, checker=None, held_out=lambda _: held_out,
+        horizons=SimpleNamespace(observation_horizon=2),
     )  # fmt: skip
 
-    def holds(rows):
+    def holds(rows, **more):
         write_rows(tmp_path / PATH, ModeRow, rows)
-        groups = iter([((name, 0, "offset"), policy) for name, policy in policies.items()])
+        known = {**policies, **more}
+        groups = iter([((name, 0, "offset"), policy) for name, policy in known.items()])
         module._hold(bench, PATH, ModeRow, groups, lambda _: 16)
         return asked
 
@@ -98,7 +99,20 @@ def test_every_situation_has_one_row_of_everybody(hold):
         hold(true_rows(["chunked_bc"]))
 
 
-def test_rows_of_nobody_are_refused_and_those_of_who_was_brought_are_asked_elsewhere(hold):
+def test_rows_of_nobody_are_refused(hold):
     with pytest.raises(RefusedError, match=r"act .*nobody of that name"):
         hold(true_rows(["bc_noise", "chunked_bc", "act"]))
-    hold(true_rows(["bc_noise", "chunked_bc", "brought"]))
+
+
+def test_of_evaluations_a_table_may_state_more_and_no_less(hold):
+    hold([replace(row, nfe=2) for row in true_rows()])
+    with pytest.raises(RefusedError, match="nfe is 0, required 1 or more"):
+        hold([replace(row, nfe=0) for row in true_rows()])
+
+
+def test_of_who_answers_otherwise_each_time_only_the_rows_are_asked_for(hold):
+    rows = true_rows(["bc_noise", "chunked_bc", "restless"])
+    forged = [replace(row, valid=0) if row.method == "restless" else row for row in rows]
+    hold(forged, restless=None)
+    with pytest.raises(RefusedError, match=r"restless.* at e29, row 3 is no row"):
+        hold(forged[:-1], restless=None)
