@@ -14,7 +14,7 @@ from typing import Any
 
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.more import astride
+from gates.more import astride, no_decision
 from gates.overrides import NOBODY, Exceptions, aside, exceptions_of, rule, said
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
 from gates.preregistration import moved_caveats
@@ -294,10 +294,9 @@ def _decision(spec: GateSpec) -> Callable[[Judged], Decision]:
     texts: Mapping[Verdict, str] = {
         "PASS": spec.go_on,
         "PENDING_REVIEW": "Wait for the independent reviewer and the four owners.",
-        "INCONCLUSIVE": "No decision: complete the evidence, then judge again.",
         "FAIL": f"Return to {spec.back_to}.",
     }
-    return lambda judged: Decision(texts[judged.verdict])
+    return lambda judged: Decision(texts.get(judged.verdict) or no_decision(judged.answers))
 
 
 def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:

@@ -7,9 +7,10 @@ and a share that stays where it is lies on one side of the limit only if it lies
 """
 
 import math
+from collections.abc import Iterable
 
 from gates.criterion import Measured
-from gates.report import Comparison
+from gates.report import Answer, Comparison
 from gates.verdicts import margin
 
 INSIDE = "the limit lies inside the interval"
@@ -79,3 +80,11 @@ def astride(measured: Measured, limit: float, comparison: Comparison) -> str:
 def hardly_decided(caveat: str) -> bool:
     """Whether the sentence of a criterion says that more of the same may not decide it."""
     return HARDLY in caveat
+
+
+def no_decision(answers: Iterable[Answer]) -> str:
+    """What an undecided gate says: whether completing the evidence is of any use."""
+    open_ = [answer.caveat for answer in answers if answer.verdict == "INCONCLUSIVE"]
+    if open_ and all(map(hardly_decided, open_)):
+        return "No decision: what is open lies so near its limit that more of it may not decide."
+    return "No decision: complete the evidence, then judge again."

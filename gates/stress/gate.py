@@ -10,6 +10,7 @@ from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.more import no_decision
 from gates.overrides import OVERRIDES
 from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
@@ -81,7 +82,7 @@ def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
 def _decide(judged: Judged) -> Decision:
     """Promote a passing candidate, or either of several, or return to the best baseline."""
     if judged.verdict == "INCONCLUSIVE":
-        return Decision("No decision: complete the evidence, then judge again.")
+        return Decision(no_decision(judged.answers))
     if judged.verdict == "PASS":
         return choose(judged)
     try:

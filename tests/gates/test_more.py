@@ -1,12 +1,13 @@
 """How many more would decide: enough is enough, and it is said for which side."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from gates.bounds import interval_of
 from gates.criterion import Measured
-from gates.more import ASTRIDE, INSIDE, astride, enough, times_as_many
+from gates.more import ASTRIDE, HARDLY, INSIDE, astride, enough, no_decision, times_as_many
 
 
 @pytest.mark.parametrize("trials", [20, 60, 223])
@@ -70,3 +71,20 @@ def test_without_what_was_seen_and_both_ends_no_number_is_made_up(measured):
 def test_an_end_on_the_limit_itself_asks_for_a_few_more():
     said = enough(0.2, (0.1, 0.3), 0.1, "<=", counted="9 starts")
     assert said.startswith("about 1.1 times as many (9 starts now) show that it is broken")
+
+
+@pytest.mark.parametrize(
+    ("caveats", "of_use"),
+    [
+        ([f"{INSIDE}: {HARDLY} (30 now) may not decide"], False),
+        ([f"{INSIDE}: {HARDLY} (30 now) may not decide", "not measured: no rows"], True),
+        ([f"{INSIDE}: about 2 times as many (30 now) show that it holds"], True),
+        ([], True),
+    ],
+)
+def test_nobody_is_sent_to_complete_what_hardly_decides(caveats, of_use):
+    held = SimpleNamespace(verdict="PASS", caveat=HARDLY)
+    broken = SimpleNamespace(verdict="FAIL", caveat=HARDLY)
+    open_ = [SimpleNamespace(verdict="INCONCLUSIVE", caveat=caveat) for caveat in caveats]
+    said = no_decision([held, broken, *open_])
+    assert said.startswith("No decision: ") and ("complete the evidence" in said) == of_use
