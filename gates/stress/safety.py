@@ -1,6 +1,9 @@
 """What must hold whatever is gained: recovery, the stub, the balance, the independent checker."""
 
+from collections.abc import Iterator
+
 import numpy as np
+import pandas as pd
 
 from gates.again import changed_since_gate_b
 from gates.bounds import counted_interval, share_interval
@@ -8,9 +11,9 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.arrivals import at_the_stub, require_played
 from gates.feasibility.proof import checked_violations
-from gates.recount import Subset, part_said
+from gates.recount import Subset, is_none, is_one, part_said
 from gates.stress.recoveries import RECOVERED, RECOVERIES, recoveries
-from gates.stress.rollouts import JOURNALS, STRESS, StressSettings, within
+from gates.stress.rollouts import DRILL, JOURNALS, STRESS, StressSettings, within
 from gates.words import percent
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
 
@@ -32,7 +35,8 @@ def recovery_success_lower(
     (`RecoveryRow`). Few entries of a condition cannot show that recovery is good there, so a
     condition is judged where as many starts, had each recovered, would show the limit; but enough
     failures can show that it is bad: where the upper bound of another condition is lower, it is
-    what is measured.
+    what is measured. What nobody called for is asked over all conditions together too, since a few
+    entries in each would never be judged; and a phase may show that it is bad, whatever others do.
     """
     rows = recoveries(evidence, settings, candidate)
     limit = settings.limits.of.get("recovery_success_lower")
@@ -40,22 +44,26 @@ def recovery_success_lower(
     if len(rows) == 0:
         raise MissingEvidenceError("not exercised: recovery began on 0 starts, in any condition")
     found = []
-    for condition, part in rows.groupby("perturbation"):
+    for where, subset, must_show in _groups(rows):
+        part = subset.of(rows)
         starts = part["start"].nunique()
         reach, _ = counted_interval(starts, starts, confidence=settings.confidence)
-        enough = reach >= least
+        enough = must_show and reach >= least
+        # Starts show that it is good; that it is bad, rollouts of one start may show together.
+        together = not enough and part["perturbation"].nunique() > 1
+        units = part["perturbation"] + part["start"].astype(str) if together else part["start"]
         _, lower, upper = share_interval(
             RECOVERED.holds(part),
-            part["start"].to_numpy(),
+            units.to_numpy(),
             confidence=settings.confidence,
             favourable=enough,  # the count of what is judged at its better end is rounded up
         )
         bound, end = (lower, "at worst") if enough else (upper, "at best")
-        recount = within(RECOVERIES, str(condition)).counted(part, RECOVERED)
+        recount = subset.counted(part, RECOVERED)
         share = part_said(recount, "recoveries")
-        text = f"worst in {condition}: {share} on {starts} starts, {end} {percent(bound)}"
+        counted = f"{units.nunique()} rollouts" if together else f"{starts} starts"
+        text = f"worst in {where}: {share} on {counted}, {end} {percent(bound)}"
         if enough or bound < least:
-            counted = f"{starts} starts"
             said = Measured(bound, (lower, upper), text, counted=counted, recount=recount)
             found.append((bound, said))
     if not found:
@@ -65,6 +73,17 @@ def recovery_success_lower(
             "recovered, less than the limit were shown"
         )
     return min(found, key=lambda one: one[0])[1]
+
+
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, Subset, bool]]:
+    """Entries that are judged together, and whether they must show that recovery is good."""
+    for condition in sorted(set(rows["perturbation"])):
+        yield str(condition), within(RECOVERIES, str(condition)), True
+    uncalled = Subset(RECOVERIES, (is_none("perturbation", DRILL),))
+    if uncalled.of(rows)["perturbation"].nunique() > 1:
+        yield f"all conditions but {DRILL}", uncalled, True
+    for phase in sorted(set(rows["phase"])):
+        yield f"phase {phase}", Subset(RECOVERIES, (is_one("phase", str(phase)),)), False
 
 
 @criterion(

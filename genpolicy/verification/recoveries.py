@@ -8,7 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from genpolicy.verification.journal_source import Message
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.verification.journal_source import Message, floats
 
 KEYS = ("method", "perturbation", "start", "recovery")
 """Columns by which an entry is known."""
@@ -18,6 +21,8 @@ ENDS = {"idle": HANDED_BACK, "ask_human": "person", "stopped": "stopped"}
 NO_PRIMITIVES = ("idle", "hold", "ask_human", "person", "abort", "stopped")
 """States that move nothing by themselves; every other one is a primitive."""
 COMMANDS = ("accept", "fallback")
+MOTION_M, MOTION_TURN = 0.001, 0.01
+"""Less than a millimetre, or half a degree, is the pose that was held."""
 Event = tuple[str, Message]
 
 
@@ -60,7 +65,9 @@ class _Entry:
         states = [m for kind, m in self.meanwhile if kind == "recovery"]
         primitives = [m["new"] for m in states if m["new"] not in NO_PRIMITIVES]
         forces_n = [m["force_n"] for kind, m in self.meanwhile if kind == "recovery_force"]
-        still = len({*([self.held] if self.held else []), *self._driven()}) < 2
+        driven = [floats(action) for action in self._driven()]
+        before = floats(self.held) if self.held else next(iter(driven), None)
+        still = before is None or not any(_apart(before, action) for action in driven)
         last_ns = self.meanwhile[-1][1]["t"] if self.meanwhile else self.first["t"]
         return {
             "phase": self.first["phase"],
@@ -83,6 +90,13 @@ class _Entry:
             driving |= kind == "recovery" and m["new"] not in NO_PRIMITIVES
             if driving and kind == "fallback":
                 yield m["action"]
+
+
+def _apart(before: NDArray[np.float64], action: NDArray[np.float64]) -> bool:
+    """Whether a command asks for a motion: of the hand, of its turn, or of its fingers."""
+    away = np.abs(action - before)
+    way_m, turn = np.linalg.norm(away[:3]), np.linalg.norm(away[3:9])
+    return bool(max(way_m, away[9]) >= MOTION_M or turn >= MOTION_TURN)
 
 
 class Recoveries:

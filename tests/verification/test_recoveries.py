@@ -3,16 +3,29 @@
 from dataclasses import asdict
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from genpolicy.evidence.shadow.rig import EXECUTION
 from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.state import Outcome
-from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.execution.journal import Journal, encode_actions, write_journal
 from genpolicy.execution.recovery import Recovery
 from genpolicy.verification.rollouts import derived_with_recoveries
 
-HELD, MOVED = "00" * 80, "11" * 80
+STILL = [0.4, 0.1, 0.2, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.03]
+"""A pose with the hand upright."""
+
+
+def beside(**changes):
+    """A command, as journals write it, with some numbers moved; by their place."""
+    values = np.array(STILL)
+    for place, by in changes.items():
+        values[int(place[1:])] += by
+    return encode_actions(values)
+
+
+HELD, MOVED = beside(), beside(_2=0.05)
 HAND_BACK = ("retreat", "return", "reach")
 SHARD = SimpleNamespace(judged=SimpleNamespace(name="flow", seed=0), perturbation="drill")
 
@@ -45,7 +58,8 @@ class Session:
         elif kind == "feel":
             self.recovery.feel(self.now_s, float(rest))
         else:
-            payload = {"action": {"held": HELD, "moved": MOVED}[rest], "age_ns": 1}
+            action = {"held": HELD, "moved": MOVED}.get(rest, rest)
+            payload = {"action": action, "age_ns": 1}
             self.journal.add(kind, self.journal.clock(self.now_s), payload)
 
 
@@ -116,6 +130,22 @@ def test_what_counts_as_not_recovered(tmp_path, words, outcome, expected):
     (row,) = told(tmp_path, words, outcome)
     assert row["recovered"] is False
     assert {name: row[name] for name in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("action", "moves"),
+    [
+        (beside(_0=0.0009), False), (beside(_0=0.0008, _1=0.0008), True), (beside(_2=0.0011), True),
+        # Two tenths of a degree are the pose that was held; a degree is not.
+        (beside(_5=0.0033), False), (beside(_5=0.008, _6=0.008), True), (beside(_3=-0.011), True),
+        (beside(_9=0.0009), False), (beside(_9=-0.0011), True),
+    ],
+)  # fmt: skip
+def test_a_command_within_a_millimetre_of_the_held_one_moves_nothing(tmp_path, action, moves):
+    words = ("accept:held", "enter:insert", "advance", f"fallback:{action}", "reach", "reach",
+             "accept:moved")  # fmt: skip
+    (row,) = told(tmp_path, words)
+    assert (row["resampled_only"], row["recovered"]) == (not moves, moves)
 
 
 def test_a_phase_that_had_to_be_recovered_again_was_not_recovered_before(tmp_path):

@@ -5,15 +5,17 @@ its goal, the policy took over from there and the episode succeeded; not where t
 to be recovered again, where a person was called, or where new samples alone had helped.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.evidence.rows.stress import RecoveryRow
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.shard import Shard
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import PRIMITIVES, RecoveryState
-from genpolicy.execution.journal import Event
+from genpolicy.execution.journal import Event, decode_actions
 from genpolicy.execution.nanoseconds import NS_PER_S
 
 HANDED_BACK, EPISODE_OVER = "handed_back", "episode_over"
@@ -24,6 +26,19 @@ ENDS = {
 }
 TIMED_OUT, REFUSED = "timed_out", "refused"
 """How an abort is told: the last primitive took too long, or could not be executed."""
+
+
+LEAST_M, LEAST_TURN = 1e-3, 0.01
+"""What a primitive must command away from the held pose to have moved anything: of the position or
+the gripper's opening, m, or of the two columns of the rotation, about rad."""
+
+
+def is_a_motion(held: str, action: str) -> bool:
+    """Whether an action, as journals write it, lies away from the held one."""
+    (away,) = decode_actions(action) - decode_actions(held)
+    if abs(away[GRIPPER]) >= LEAST_M or math.hypot(*away[POSITION]) >= LEAST_M:
+        return True
+    return math.hypot(*away[ROTATION]) >= LEAST_TURN
 
 
 @dataclass
@@ -82,7 +97,7 @@ def entries_of(events: Iterable[Event]) -> list[Entry]:
                 # What moves is a primitive's own, and nothing of the policy.
                 if running and kind == "fallback" and entry.primitives:
                     entry.held = entry.held or payload["action"]
-                    entry.moved |= entry.held != payload["action"]
+                    entry.moved |= is_a_motion(entry.held, payload["action"])
                 entry.taken_over |= kind == "accept" and entry.ended == HANDED_BACK
             commanded = payload["action"]
         elif kind == "recovery_force" and entry is not None and running:

@@ -65,6 +65,15 @@ def test_the_share_of_hits_is_the_probability():
     assert abs(np.mean(hits) - 0.15) < 4 * np.sqrt(0.15 * 0.85 / 2000)
 
 
+def test_a_shipped_chunk_that_is_overtaken_is_neither_too_old_nor_too_late_for_its_term(kit):
+    """Beyond the deadline of its term it is thrown away unasked, and nothing is ever reordered."""
+    execution, declared = kit.PARAMS["execution"], kit.PARAMS["latency"]["declared"]
+    deadlines = {term: limit for term, limit, _ in execution["term_deadlines"]}
+    planned = kit.PARAMS["stress"]["perturbations"]["queue_reorder"]
+    latest_s = planned["magnitude_s"] + declared["queue"][1]
+    assert latest_s < deadlines["queue"] and latest_s < execution["maximum_age_s"]
+
+
 def test_each_kind_touches_what_it_names():
     assert at(settings("policy_stall")).extra_s == {"sample": 0.08}
     assert at(settings("queue_reorder")).extra_s == {"queue": 0.3}

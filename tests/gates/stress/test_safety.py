@@ -94,6 +94,43 @@ def test_every_condition_with_starts_enough_must_show_it(ladder):
     assert found.interval == clopper_pearson(10, 16, 0.95)
 
 
+def test_a_few_failures_in_each_of_many_conditions_are_seen_together(ladder):
+    """Nobody recovers but in drills; five times in a condition show nothing of it alone."""
+    conditions = ("camera_delay", "network_jitter", "compute_contention")
+    for number, condition in enumerate(conditions, start=1):
+        begun(ladder, condition, 5, 0)
+        found = recovery(ladder)
+        seen = number > 1  # in one condition it is that condition's own
+        assert (found.value == clopper_pearson(0, 5 * number, 0.95)[1]) == seen
+        assert ("all conditions but recovery_drill" in found.caveat) == seen
+    assert "0 of 15 recoveries) on 15 rollouts, at best" in found.caveat.replace("none of", "0 of")
+    assert judge(ladder, "D").candidates["flow"] == "FAIL"
+
+
+def test_what_nobody_called_for_must_be_shown_where_starts_are_enough(ladder):
+    begun(ladder, "camera_delay", 4, 3)
+    begun(ladder, "network_jitter", 8, 6)
+    found = recovery(ladder)
+    assert "recovery_drill" not in found.caveat.replace("but recovery_drill", "")
+
+
+def test_a_phase_in_which_nothing_recovers_is_not_hidden_by_another(ladder):
+    def late(frame):
+        drilled = frame["perturbation"].eq("recovery_drill") & of(frame)
+        return drilled & (frame["start"] >= N - 9)
+
+    before = recovery(ladder)
+    evidence.edit_table(ladder, ROLLOUTS, lambda f: f.assign(recovered=f["recovered"] & ~late(f)))
+    evidence.edit_table(
+        ladder,
+        "stress/recoveries.parquet",
+        lambda f: f.assign(phase=f["phase"].mask(late(f), "leave")),
+    )
+    found = recovery(ladder)
+    assert found.value == clopper_pearson(0, 9, 0.95)[1] < 0.5 <= before.value
+    assert found.caveat.startswith("worst in phase leave: ") and "on 9 starts" in found.caveat
+
+
 def test_few_failures_that_show_it_is_bad_are_enough(ladder):
     """No recovery on five starts of a condition cannot be one that helps more often than not."""
     begun(ladder, "camera_delay", 5, 0)
