@@ -13,6 +13,7 @@ from typing import Any
 from gates.card.searched import FAILURE_SEARCH
 from gates.pages.printing import differing
 from gates.proof import Rung
+from gates.rederive_audit import rederive_audit
 from gates.rederive_brought import rederive_brought
 from gates.rederive_checked import rederive_checked
 from gates.rederive_clocks import rederive_clocks
@@ -107,9 +108,10 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
-            planned, a chunk or a count of modes not what its checkpoint draws again, or a power,
-            a mutant, a statistic, a split or the cost of a distillation is not what is computed
-            again. Or a page or a file of rows says other than the report.
+            planned, a chunk or a count of modes not what its checkpoint draws again, a row of the
+            audit not what its dataset gives again, or a power, a mutant, a statistic, a split or
+            the cost of a distillation is not what is computed again. Or a page or a file of rows
+            says other than the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -125,6 +127,8 @@ def _evidence(root: Path, gate: Gate) -> None:
     params = read_params(root)
     if gate in TRAININGS:
         rederive_trainings(root, gate, params)
+        if gate == "A":
+            rederive_audit(root, params)  # modes are counted at the situations that it names
         rederive_modes(gate, root, params)
     if gate == "B":
         rederive_brought(root, params)
