@@ -1,8 +1,9 @@
 """Evidence derived again from what lies under it: what `genpolicy verify report` adds.
 
 The independent checker reads every journal again, and every table that gates C and D judge must be
-what the journals say. What is computed and not recorded (power, mutants) is computed again. Slow
-beside hashing, so it is asked for by name and not at every admission.
+what the journals say. What is computed and not recorded (power, mutants) is computed again, and the
+audit runs again on its dataset. Slow beside hashing, so it is asked for by name and not at every
+admission.
 """
 
 from collections.abc import Mapping, Sequence
