@@ -1,8 +1,9 @@
 """Evidence derived again from what lies under it: what `genpolicy verify report` adds.
 
 The independent checker reads every journal again, and every table that gates C and D judge must be
-what the journals say. What is computed and not recorded (power, mutants) is computed again. Slow
-beside hashing, so it is asked for by name and not at every admission.
+what the journals say. What is computed and not recorded (power, mutants) is computed again, and the
+audit runs again on its dataset. Slow beside hashing, so it is asked for by name and not at every
+admission.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import Any
 from gates.card.searched import FAILURE_SEARCH
 from gates.pages.printing import differing
 from gates.proof import Rung
+from gates.rederive_audit import rederive_audit
 from gates.rederive_brought import rederive_brought
 from gates.rederive_checked import rederive_checked
 from gates.rederive_clocks import rederive_clocks
@@ -107,9 +109,10 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
-            planned, a chunk, a mode, a fixture or a latent not what its checkpoint draws again, or
-            a power, a mutant, a statistic, a split or the cost of a distillation is not what is
-            computed again. Or a page or a file of rows says other than the report.
+            planned, a chunk, a mode, a fixture or a latent not what its checkpoint draws again, a
+            row of the audit not what its dataset gives again, or a power, a mutant, a statistic, a
+            split or the cost of a distillation is not what is computed again. Or a page or a file
+            of rows says other than the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -125,6 +128,8 @@ def _evidence(root: Path, gate: Gate) -> None:
     params = read_params(root)
     if gate in TRAININGS:
         rederive_trainings(root, gate, params)
+        if gate == "A":
+            rederive_audit(root, params)  # modes are counted at the situations that it names
         rederive_policies(gate, root, params)
     if gate == "B":
         rederive_brought(root, params)

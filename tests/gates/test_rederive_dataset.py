@@ -91,7 +91,8 @@ def test_rows_of_unequal_length_are_refused(dataset, least):
 
 
 def test_gate_a_is_refused_where_its_dataset_is(dataset, monkeypatch):
-    monkeypatch.setattr(rederive, "rederive_policies", lambda *_: None)  # nothing was trained here
+    for name in ("rederive_audit", "rederive_policies"):  # nothing was recorded or trained here
+        monkeypatch.setattr(rederive, name, lambda *_: None)
     rung = Rung("A", "need", "PASS", "", "", "reports/gate_a.json", 0)
     assert rederived(dataset, [rung])[0].verdict == "PASS"
     evidence.edit_document(dataset, "ingest/manifest.json", lambda d: {"schema_version": 1})

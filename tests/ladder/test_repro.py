@@ -4,13 +4,16 @@ import json
 from pathlib import Path
 
 import pandas as pd
+import pyarrow as pa
 import pytest
 import yaml
 from ladder_workspace import edit_params, hashes, repro, set_limit
 
+from gates.rederive_audit import hold_audit, measure_again
 from gates.rederive_policies import rederive_policies
 from gates.report import Gate
 from genpolicy.errors import RefusedError
+from genpolicy.integrity.tables import read_table, write_table
 
 GATES = [f"gate_{letter}" for letter in "abcde"]
 EVIDENCE = [
@@ -67,6 +70,25 @@ def test_counts_are_those_that_the_checkpoints_give(
     frame.to_parquet(path)
     with pytest.raises(RefusedError, match=rf"{who} \(seed 0\)"):
         rederive_policies(gate, copy, params)
+
+
+def test_rows_of_the_audit_are_those_that_its_dataset_gives(copy: Path, tmp_path: Path) -> None:
+    """Forged in every row, as somebody would who commits and judges them."""
+    stated, again = copy / "artifacts/audit", tmp_path / "again"
+    again.mkdir()
+    measure_again(copy, yaml.safe_load((copy / "params.yaml").read_text()), again)
+    hold_audit(stated, again)
+    for table, column, value in (
+        ("strata", "effect_upper", 0.05), ("replay", "replayed", "success"),
+        ("neighbourhoods", "persistent", True), ("modes", "successes", 20),
+    ):  # fmt: skip
+        path = stated / f"{table}.parquet"
+        before = read_table(path)
+        frame = before.to_pandas().assign(**{column: value})
+        write_table(path, pa.Table.from_pandas(frame, schema=before.schema, preserve_index=False))
+        with pytest.raises(RefusedError, match=rf"audit/{table}\.parquet: .*: {column} is"):
+            hold_audit(stated, again)
+        write_table(path, before)
 
 
 def test_a_second_repro_does_nothing(copy: Path) -> None:

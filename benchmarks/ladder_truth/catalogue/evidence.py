@@ -55,6 +55,11 @@ def _never_valid(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(**{name: frame[name].mask(noisy, 0) for name in columns})
 
 
+def _explained_by_nothing(frame: pd.DataFrame) -> pd.DataFrame:
+    tests = {"p_value": 1.0, "p_adjusted": 1.0}
+    return frame.assign(**tests, effect=0.0, effect_lower=0.0, effect_upper=0.05)
+
+
 def _in_the_modes(frame: pd.DataFrame) -> pd.DataFrame:
     flow = frame["method"] == "flow"
     lost = ("between_modes", "far_from_modes")
@@ -134,6 +139,12 @@ WRONGS = (
           all_of(table("artifacts/measure_baselines/modes.parquet", _never_valid),
                  committed("measure_baselines")),
           Expected("A", (), refusal=r"bc_noise \(seed 0\)")),
+    Wrong("the_audit_is_forged", "evidence",
+          "No variable explains the modes, by the audit's table, and that is committed.",
+          "small",
+          all_of(table("artifacts/audit/strata.parquet", _explained_by_nothing),
+                 committed("audit")),
+          Expected("A", (), refusal=r"artifacts/audit/strata\.parquet: .* as measured again")),
     Wrong("every_sample_is_in_a_mode", "evidence",
           "No sample of the flow lies between the modes, by its table, and that is committed.",
           "small",
