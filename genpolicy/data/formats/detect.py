@@ -20,7 +20,13 @@ HDF5_SUFFIXES = (".hdf5", ".h5", ".hdf")
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 PARQUET_MAGIC = b"PAR1"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
-LAYOUT_OF = {".mcap": "mcap", ".parquet": "parquet", **dict.fromkeys(HDF5_SUFFIXES, "robomimic")}
+PARQUET_SUFFIXES = (".parquet", ".pq", ".parq")
+LAYOUT_OF = {
+    ".mcap": "mcap",
+    **dict.fromkeys(PARQUET_SUFFIXES, "parquet"),
+    **dict.fromkeys(HDF5_SUFFIXES, "robomimic"),
+}
+"""By the end of a file's name, whatever its case."""
 SHOWN = 5
 # A whole disk is not walked to count what is on it.
 MOST_DATASETS = 50
@@ -119,7 +125,7 @@ def contents(path: Path, *, into_whole: bool = False) -> Contents:
                 break
             continue
         for name in sorted(files):
-            layout = LAYOUT_OF.get(Path(name).suffix)
+            layout = LAYOUT_OF.get(Path(name).suffix.lower())
             if layout is None:
                 found.others[Path(name).suffix or "no suffix"] += 1
             else:
@@ -234,11 +240,12 @@ def _file(path: Path) -> str:
         _refuse(path, "a device or a pipe", "a regular file, or a folder")
     with path.open("rb") as stream:
         head = stream.read(8)
-    if head == HDF5_MAGIC or path.suffix in HDF5_SUFFIXES:
+    named = LAYOUT_OF.get(path.suffix.lower())
+    if head == HDF5_MAGIC or named == "robomimic":
         return "robomimic"
-    if head[:4] == PARQUET_MAGIC or path.suffix == ".parquet":
+    if head[:4] == PARQUET_MAGIC or named == "parquet":
         return "parquet"
-    if head == MCAP_MAGIC or path.suffix == ".mcap":
+    if head == MCAP_MAGIC or named == "mcap":
         return "mcap"
     _refuse_unknown(path, f"a {path.suffix} file" if path.suffix else "no suffix that is known")
 

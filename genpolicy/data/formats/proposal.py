@@ -22,7 +22,7 @@ from genpolicy.data.formats.contract import (
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
 from genpolicy.data.formats.sampling import labels_among, sample_episodes, settled
 from genpolicy.data.formats.source import Column, Source, as_float
-from genpolicy.data.formats.units import BULK, tokens
+from genpolicy.data.formats.units import BULK, HANDS, tokens
 from genpolicy.errors import BadInputError, ContractError
 
 Array = NDArray[np.float64]
@@ -35,7 +35,8 @@ LONGEST_GAP_S = 0.25
 LONGEST_GAP_ROWS = 3.0
 FROZEN_S = 2.0
 FROZEN_SHARE = 0.1
-STATED = {"observation", "obs", "state"}
+OBSERVED = {"observation", "obs"}
+STATED = {*OBSERVED, "state"}
 TIME_UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3}
 ACTION_WORDS = (("action", "actions"), ("command", "cmd", "commanded"), ("target", "goal"))
 
@@ -119,10 +120,15 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
 def _without_labels(
     observed: tuple[Column, ...], sample: Sample, notes: list[str]
 ) -> tuple[Column, ...]:
-    """Without columns that look like labels, where no name says what is observed."""
+    """Without columns that look like labels, where no name says that they are observed.
+
+    `observation.mode` says so; `planner_state` is called a state, and so is what a script is in.
+    """
+    named = [c for c in observed if not OBSERVED & {*tokens(c.name)[:1]}]
     if any(STATED & set(tokens(c.name)) for c in observed):
-        return observed
-    found = labels_among(observed, sample.episodes)
+        called = [(c, tokens(c.name)) for c in named]
+        named = [c for c, words in called if words[-1:] == ["state"] and not HANDS & {*words}]
+    found = labels_among(named, sample.episodes)
     if not found or len(found) == len(observed):
         return observed
     notes.append(

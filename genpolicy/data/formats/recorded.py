@@ -19,11 +19,19 @@ COUNTERS = {
     *("index", "frame_index", "step_index", "episode_index", "frame", "step", "timestamp"),
     *("episode_uuid", "num_samples", "rows", "n_rows", "chunk_index", "file_index"),
 }
-OUTCOMES = {
-    *("reward", "rewards", "return", "returns", "score", "done", "dones", "terminal", "terminals"),
-    *("terminated", "truncated", "next", "success", "succeeded", "outcome", "discount"),
-    *("length", "duration", "mask"),
+JUDGES = {
+    *("reward", "rewards", "done", "dones", "terminal", "terminals", "terminated", "truncated"),
+    *("success", "succeeded", "outcome", "discount"),
 }
+"""Words of what comes of an episode, wherever they end a name (`is_success`, `next.done`)."""
+MEASURES = {"return", "returns", "score", "length", "duration", "mask", "next"}
+"""Words that are one only by themselves: the length of a tool decides, that of an episode not."""
+OF_AN_EPISODE = {
+    *("episode", "episodes", "ep", "traj", "trajectory", "step", "steps", "action", "actions"),
+    *("total", "sum", "mean", "max", "min", "cumulative", "final", "rate", "is", "was", "per"),
+    *("valid", "pad", "padding", "attention", "loss", "sparse", "dense", "shaped", "env"),
+}
+"""Words that say nothing else beside one of these."""
 ENDS = {("from", "index"), ("to", "index")}
 FLAGS = ("is_first", "is_last", "is_terminal")
 # A value must hold this many rows on average; less is a signal.
@@ -39,7 +47,10 @@ def may_be_reason(name: str) -> bool:
     plain = name.lower().removeprefix("observation.")
     if plain in COUNTERS or plain in FLAGS or tuple(words[-2:]) in ENDS:
         return False
-    return not OUTCOMES & {*words[:1], *words[-1:]}
+    if JUDGES & {*words[-1:]}:
+        return False
+    plainly = all(word in JUDGES | MEASURES | OF_AN_EPISODE or word.isdigit() for word in words)
+    return not (plainly and (JUDGES | MEASURES) & {*words})
 
 
 class Reasons:

@@ -34,6 +34,18 @@ def test_layouts_are_told_by_what_is_there(layouts, tmp_path):
         detect(tmp_path / "none")
 
 
+def test_recordings_are_known_by_the_ends_of_their_names_in_any_case(layouts, tmp_path):
+    """What has another suffix of the same layout was left out of the folder in silence."""
+    folder = tmp_path / "all"
+    folder.mkdir()
+    for number, name in enumerate(("a.parquet", "b.PARQUET", "c.pq", "d.parq")):
+        layouts.file(folder, number).rename(folder / name)
+    assert detect(folder) == "parquet"
+    assert [path.name for path in files_of(folder, "parquet")] == [
+        "a.parquet", "b.PARQUET", "c.pq", "d.parq",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("missing", [None, *AUDIT_FILES])
 def test_an_audit_written_beside_recordings_is_no_data_set(tmp_path, missing):
     """Whoever audits one file and writes beside it can audit the folder afterwards."""

@@ -29,8 +29,11 @@ def values_of(path, tmp_path, **options):
 
 
 @pytest.mark.parametrize(
-    "name", ["task_index", "subtask_index", "scenario", "hand", "latent", "collector", "q7_Ω", "k"]
-)
+    "name",
+    ["task_index", "subtask_index", "scenario", "hand", "latent", "collector", "q7_Ω", "k",
+     "next_goal", "next_target", "done_by", "rod_length", "tool_length", "return_bin", "side_mask",
+     "mask_colour", "score_sheet", "truncated_rod", "length_class", "observation.return_bin"],
+)  # fmt: skip
 def test_a_name_does_not_keep_a_column_from_being_a_reason(name):
     assert may_be_reason(name)
 
@@ -38,7 +41,9 @@ def test_a_name_does_not_keep_a_column_from_being_a_reason(name):
 @pytest.mark.parametrize(
     "name",
     ["index", "frame_index", "episode_index", "timestamp", "reward", "next.done", "next.success",
-     "dataset_from_index", "is_terminal", "success", "length"],
+     "dataset_from_index", "is_terminal", "success", "length", "episode_length", "is_success",
+     "sparse_reward", "cumulative_reward", "success_rate", "total_score", "ep_return", "next",
+     "next.reward", "action_mask", "pad_mask", "reward_0", "task_success", "observation.done"],
 )  # fmt: skip
 def test_what_counts_or_judges_is_no_reason(name):
     assert not may_be_reason(name)
@@ -265,6 +270,22 @@ def test_whole_numbers_that_hold_are_labels_where_nothing_says_what_is_observed(
     opened, kept = values_of(recordings(tmp_path / "stated", "obs_"), tmp_path)
     assert not kept
     assert any("goal" in channel.name for channel in opened.contract.channels)
+
+
+def test_what_a_script_is_in_is_a_label_also_where_it_is_called_a_state(layouts, tmp_path):
+    """The verdict does not depend on a name; a hand's state and what is observed stay so."""
+    (tmp_path / "plain").mkdir()
+    for i in range(EPISODES):
+        state, action = layouts.samples(i)
+        table = {
+            "state_x_m": state[:, 0], "action_x_m": action[:, 0],
+            "planner_state": np.full(30, i % 2), "gripper_state": np.full(30, i % 2),
+            "observation.light_state": np.full(30, i % 2),
+        }  # fmt: skip
+        pq.write_table(pa.table(table), tmp_path / "plain" / f"e{i}.parquet")
+    opened, kept = values_of(tmp_path / "plain", tmp_path)
+    assert set(kept) == {"planner_state"}
+    assert any("Taken as labels, not as observed: planner_state" in n for n in opened.notes)
 
 
 def test_what_is_not_kept_is_noted():
