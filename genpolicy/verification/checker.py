@@ -144,6 +144,7 @@ class _Session:
             self.unanswered_ns = self.t
         elif kind == "hold":
             self._answered(self.t)
+            self.continuity.hold(m)
             self.unanswered_ns = None
         elif kind == "session":
             self._check_settings(m)
