@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from playing import begin, judged
+from playing import begin, checked, judged
 
 from genpolicy.evidence.shadow.rig import IMITATED, Rig
 from genpolicy.execution.checks import without
@@ -174,6 +174,14 @@ def test_executor_and_stub_hear_of_a_hold_each_for_itself(name, blind):
     rig, command = interrupted(name, **tables | {blind: without(IMITATED, "continuity")})
     assert command.kind == "hold" and rig.stub.accepted == 1
     assert rig.stub.stale == (blind == "checks")
+
+
+@pytest.mark.parametrize("name", INTERRUPTIONS)
+def test_the_checker_sees_it_where_nobody_asks(name):
+    rig, command = interrupted(name, checks=without(IMITATED, "continuity"))
+    assert command.kind == "action" and rig.stub.accepted == 2
+    found = {v.rule for v in checked(rig.end()).violations}
+    assert found == {"settings.checks", "P5.continuity"}
 
 
 @pytest.mark.parametrize("ms", [45, 50, 55, 74])

@@ -70,7 +70,7 @@ def test_after_somebody_else_moved_the_arm_no_command_binds():
     assert rules(start, (chunk(), accept(20, 0, arrival=1)), forget=1)[1] == [PACE]
 
 
-@pytest.mark.parametrize(("t", "found"), [(44, [PACE]), (45, []), (50, []), (99, []), (0, [PACE])])
+@pytest.mark.parametrize(("t", "found"), [(44, [PACE]), (45, []), (50, []), (74, []), (0, [PACE])])
 def test_the_pace_is_nine_tenths_of_a_period(t, found):
     own = chunk()
     assert rules((own, accept(0, 0)), (own, accept(t, 1)))[1] == found
