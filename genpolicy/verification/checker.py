@@ -18,6 +18,7 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.attended import Attended
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
+from genpolicy.verification.dated import NEVER_NS, misdated
 from genpolicy.verification.expected import ALWAYS, ExpectedSettings
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.joined import Joined
@@ -91,7 +92,7 @@ class _Session:
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.head: tuple[int, str] | None = None
-        self.n, self.t = -1, -(1 << 62)
+        self.n, self.t = -1, NEVER_NS
         self.ended, self.last_sequence = False, -1
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
@@ -112,8 +113,7 @@ class _Session:
         if m.get("n") != self.n + 1:
             self.flag("journal.gap", f"Event {m.get('n')} follows event {self.n}.")
         self.n = m.get("n", self.n + 1)
-        if m["t"] < self.t:
-            self.flag("journal.time", f"Time goes back from {self.t} ns to {m['t']} ns.")
+        self._flag_all(misdated(self.t, m))
         self.t = m["t"]
         late_arrival = kind == "discard" and m.get("reason") == "end_of_episode"
         # A stop is heard at any time.
@@ -192,10 +192,8 @@ class _Session:
     # P1, P3, P5, P7: accepted actions ----------------------------------------------------------
 
     def _check_accept(self, kind: str, m: Message) -> None:
-        if kind == "accept":
-            self.report.checked_actions += 1
-        else:
-            self.report.checked_fallback_actions += 1
+        self.report.checked_actions += kind == "accept"
+        self.report.checked_fallback_actions += kind == "fallback"
         chunk = self.open.get(m["arrival"])
         if chunk is None or chunk["chunk_id"] != m["chunk_id"]:
             self.flag("P1.admitted", f"{m['chunk_id']!r} is not an enqueued, open chunk.")

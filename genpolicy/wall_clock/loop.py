@@ -11,7 +11,7 @@ import select
 import time
 from collections.abc import Callable
 
-from genpolicy.execution.journal import LONGEST_JUMP_NS
+from genpolicy.execution.believed import LONGEST_JUMP_NS
 from genpolicy.execution.nanoseconds import NS_PER_S
 from genpolicy.wall_clock.admission import AdmissionThread
 from genpolicy.wall_clock.channel import Inbox, Outbox
