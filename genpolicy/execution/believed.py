@@ -52,9 +52,10 @@ class BelievedClock:
         same, and none was believed since. What a person reads once may be the glitch.
         """
         now_ns, before_ns = ns_or_none(now_s), self._ahead_ns
-        if now_ns is not None and before_ns is not None:
-            if abs(now_ns - before_ns) <= LONGEST_JUMP_NS:
-                self.latest_ns = max(self.latest_ns, now_ns)
+        if now_ns is None or before_ns is None:
+            return self.clock(now_s)
+        if abs(now_ns - before_ns) <= LONGEST_JUMP_NS:
+            self.latest_ns = max(self.latest_ns, now_ns)
         return self.clock(now_s)
 
     def beside(self, now_s: float) -> str:

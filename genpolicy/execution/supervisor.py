@@ -39,7 +39,7 @@ FLAGS = (bool, np.bool_)
 LONGEST_TEXT = 120
 
 
-class DoubtedTime(ContractError):
+class DoubtedTimeError(ContractError):
     """A person resets at a time that the session does not believe."""
 
 
@@ -125,7 +125,7 @@ class Supervisor:
 
         Raises:
             ContractError: No person is named.
-            DoubtedTime: The time is not believed, on record as `reset_refused`. Where the session
+            DoubtedTimeError: The time is not believed, on record as `reset_refused`. Where the session
                 has believed a clock that was ahead, the person ends it and begins another one.
         """
         if not says(person):
@@ -149,7 +149,7 @@ class Supervisor:
         self._record(now_ns, RESET_REFUSED, f"{self._journal.doubt}, {beside}, by {person}")
         again = "Look at the clock; where it is right, reset again."
         over = "this session believed a clock that was ahead: end it, and begin another one."
-        raise DoubtedTime(
+        raise DoubtedTimeError(
             where="the time of a supervisor reset",
             found=beside,
             expected="one that the session believes",

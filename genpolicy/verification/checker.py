@@ -5,9 +5,9 @@ about freshness: phase, calibration, newest observation, voiding events and stop
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, P8 a person has the arm
-(`attended`), `clock` (no answer before its time), `sensor` (nothing seen before it arrived),
-`state` (what was measured), `conservation`, `journal` (form), `settings` (declared limits).
+P6 feasible (of a blend by its own admission, `joined`), P7 stop is sticky (`silence` is one), P8 a
+person has the arm (`attended`), `clock` (no answer before its time), `sensor` (nothing seen before
+it arrived), `state` (what was measured), `conservation`, `journal` (form), `settings` (limits).
 """
 
 import hashlib
@@ -26,6 +26,7 @@ from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.measured import Measured
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
+from genpolicy.verification.silence import Silence
 from genpolicy.verification.world_view import WorldView
 
 LAYERS = 6
@@ -88,6 +89,7 @@ class _Session:
         self.joined = Joined()
         self.attended = Attended()
         self.measured = Measured(proof)
+        self.silence = Silence(expected.silence_stop_s if expected else None)
         self.continuity = Continuity(proof)
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
@@ -122,9 +124,8 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
-            self._flag_all(self.invocations.follow(kind, m))
-            self._flag_all(self.attended.follow(kind, m))
-            self._flag_all(self.measured.follow(kind, m))
+            for part in (self.invocations, self.attended, self.measured, self.silence):
+                self._flag_all(part.follow(kind, m))
             self._follow(kind, m)
             self._flag_all(self.joined.follow(kind, m, self.world.void_before, self.settings))
         except Exception as error:  # of what was forged, reading may raise anything

@@ -15,6 +15,6 @@ def misdated(before_ns: int, m: Message) -> Iterator[tuple[str, str]]:
     after_ns = m["t"]
     if after_ns < before_ns:
         yield "journal.time", f"Time goes back from {before_ns} ns to {after_ns} ns."
-    elif before_ns != NEVER_NS and after_ns - before_ns > LEAP_NS:
-        if m.get("event") != "human_reset":
-            yield "journal.leap", f"Time leaps from {before_ns} ns to {after_ns} ns, by nobody."
+    leaps = before_ns != NEVER_NS and after_ns - before_ns > LEAP_NS
+    if leaps and m.get("event") != "human_reset":
+        yield "journal.leap", f"Time leaps from {before_ns} ns to {after_ns} ns, by nobody."

@@ -1,4 +1,4 @@
-"""Which readings of a clock are believed, and what a person can say and do about one that was wrong."""
+"""Which readings of a clock are believed, and what a person can do about one that was wrong."""
 
 import math
 
@@ -8,7 +8,7 @@ from playing import begin, judged
 from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.believed import BelievedClock
 from genpolicy.execution.nanoseconds import NEVER_NS
-from genpolicy.execution.supervisor import DoubtedTime
+from genpolicy.execution.supervisor import DoubtedTimeError
 
 HOUR_S = 3600.0
 
@@ -75,7 +75,7 @@ def test_a_reset_at_a_time_that_is_doubted_clears_nothing_and_is_on_record():
         (math.nan, "no_time", "is no time"), (0.01, "clock_backwards", "is 0.090 s behind"),
         (HOUR_S, "clock_ahead", "is 3599.900 s ahead"),
     ):  # fmt: skip
-        with pytest.raises(DoubtedTime, match=f"{told}.* reset again"):
+        with pytest.raises(DoubtedTimeError, match=f"{told}.* reset again"):
             rig.supervisor.human_reset(now_s, "Ann")
         said = rig.journal.last("supervisor")
         assert (said["event"], said["state"]) == ("reset_refused", "emergency_stop")
@@ -91,7 +91,7 @@ def test_who_reads_the_same_twice_is_believed():
     begin(rig)
     rig.supervisor.emergency_stop(rig.now_s)
     rig.now_ns = 3600 * 10**9  # everybody slept, and nobody asked the clock
-    with pytest.raises(DoubtedTime, match="reset again"):
+    with pytest.raises(DoubtedTimeError, match="reset again"):
         rig.supervisor.human_reset(rig.now_s, "Ann")
     rig.supervisor.human_reset(rig.now_s + 5.0, "Ann")
     rig.now_ns += 5 * 10**9
@@ -127,7 +127,7 @@ def test_a_session_that_believed_a_clock_ahead_is_ended_by_a_person_who_is_told_
         rig.deliver(rig.chunk())
         assert rig.tick()[0].reason == "clock_backwards"
         before = stands(rig)
-        with pytest.raises(DoubtedTime, match=r"s behind.* end it, and begin another one"):
+        with pytest.raises(DoubtedTimeError, match=r"s behind.* end it, and begin another one"):
             rig.supervisor.human_reset(rig.now_s, "Ann")
         assert stands(rig) == before
     judged(rig)  # ends it: the journal is whole, in order and balanced

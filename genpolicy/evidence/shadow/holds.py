@@ -41,6 +41,7 @@ def _still(journal: Journal) -> Iterator[tuple[str, str, str]]:
         elif event.kind == "supervisor" and payload["event"] == "watchdog":
             detail = payload["detail"]
             yield phase, WATCHDOG, detail if detail in DOUBTS else SILENCE
+        elif event.kind == "supervisor" and payload["event"] == RESET_REFUSED:
+            continue  # the stop stood before
         elif event.kind == "supervisor" and payload["state"] in STOPPED:
-            if payload["event"] != RESET_REFUSED:  # it stood before
-                yield phase, STOP, payload["event"]
+            yield phase, STOP, payload["event"]
