@@ -125,8 +125,8 @@ class Supervisor:
 
         Raises:
             ContractError: No person is named.
-            DoubtedTimeError: The time is not believed, on record as `reset_refused`. Where the session
-                has believed a clock that was ahead, the person ends it and begins another one.
+            DoubtedTimeError: The time is not believed, on record as `reset_refused`. Where the
+                session has believed a clock that was ahead, the person ends it and begins another.
         """
         if not says(person):
             raise ContractError(

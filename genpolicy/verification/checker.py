@@ -115,7 +115,7 @@ class _Session:
         if m.get("n") != self.n + 1:
             self.flag("journal.gap", f"Event {m.get('n')} follows event {self.n}.")
         self.n = m.get("n", self.n + 1)
-        self._flag_all(misdated(self.t, m))
+        self._flag_all(misdated(self.t, kind, m))
         self.t = m["t"]
         late_arrival = kind == "discard" and m.get("reason") == "end_of_episode"
         # A stop is heard at any time.

@@ -113,8 +113,11 @@ def test_after_a_hold_on_record_none_follows_and_another_one_was_checked_from_re
         own.hold({"t": t, "reason": reason})
         own.hold({"t": 50, "reason": "watchdog"})
         assert [rule for rule, _ in own.follow(*second, PERIOD)] == found
-        assert not list(own.follow(second[0], accept(100, second[1]["row"] + 1,
-                                                     arrival=second[1]["arrival"]), PERIOD))
+        assert not list(
+            own.follow(
+                second[0], accept(100, second[1]["row"] + 1, arrival=second[1]["arrival"]), PERIOD
+            )
+        )
 
 
 @pytest.mark.parametrize(("reason", "t"), [("empty", 20), ("watchdog", 50)])

@@ -13,15 +13,17 @@ BEGIN_NS = 1_000
 )
 def test_time_goes_on_and_not_too_far(later_ns, found):
     event = {"t": BEGIN_NS + later_ns}
-    assert [rule for rule, _ in misdated(BEGIN_NS, event)] == found
-    assert [rule for rule, _ in misdated(BEGIN_NS, {**event, "event": "watchdog"})] == found
+    for kind, said in (("hold", ""), ("supervisor", "watchdog"), ("hold", "human_reset")):
+        m = {**event, "event": said}
+        assert [rule for rule, _ in misdated(BEGIN_NS, kind, m)] == found
 
 
 def test_a_person_may_say_that_it_is_later_and_not_that_it_is_earlier():
     said = {"event": "human_reset"}
-    assert not list(misdated(BEGIN_NS, {**said, "t": 100 * LEAP_NS}))
-    assert [rule for rule, _ in misdated(BEGIN_NS, {**said, "t": 0})] == ["journal.time"]
+    assert not list(misdated(BEGIN_NS, "supervisor", {**said, "t": 100 * LEAP_NS}))
+    back = misdated(BEGIN_NS, "supervisor", {**said, "t": 0})
+    assert [rule for rule, _ in back] == ["journal.time"]
 
 
 def test_the_first_time_may_be_any():
-    assert not list(misdated(NEVER_NS, {"t": 100 * LEAP_NS}))
+    assert not list(misdated(NEVER_NS, "session", {"t": 100 * LEAP_NS}))
