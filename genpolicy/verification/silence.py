@@ -31,7 +31,7 @@ class Silence:
     def follow(self, kind: str, m: Message) -> Iterator[tuple[str, str]]:
         """Take an event in; yields a silence behind which nothing stopped."""
         if kind == "supervisor":
-            if self._stopped and m["event"] == "human_reset":
+            if self._stopped:  # that only a person ends it is another rule (P7.sticky)
                 self._accepted_ns = None
             self._stopped = m["state"] in STOPS
         elif kind in ("accept", "fallback"):
