@@ -101,6 +101,8 @@ CHECKS_ASKED_FOR = (
     "execution.deaf_to_collision",
     "execution.deaf_to_emergency_stop",
     "execution.deaf_to_phase",
+    "execution.deaf_to_silence",
+    "execution.deaf_to_restart",
 )
 NOT_ASKED_OF_EVERY_TASK = (
     "geometric.scene_collision",

@@ -1,9 +1,13 @@
 """Continuity: is the way from the last command to the next row one that feasibility checked?
 
 It checked the ways between the rows of a chunk, and the one from the last command of its own
-moment to the first row that it was asked about. After a row that was left out, or another command
-in between, nobody has checked anything, and the chunk needs a new admission. Executor and
+moment to the first row that it was asked about. After a row that was left out, another command in
+between, or a hold, nobody has checked anything, and the chunk needs a new admission. Executor and
 controller stub each keep their own.
+
+A hold is half a period more than the one that a command lasts, by the clock; and one by the
+watchdog, or for a clock that is doubted, however short, since that clock measured nothing. A loop
+that asks several times a period is told to hold for what is not due yet: that alone is none.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -49,12 +53,21 @@ class Continuity:
         self.given_ns: int | None = None
         self._last: Given | None = None
         self._resumed_ns = NEVER_NS
+        self._held_ns: int | None = None
         self._commands = 0
 
     def note(self, now_ns: int, chunk: "Admitted", row: int, action: Array) -> None:
         """The controller was given a row."""
         self._last, self.given_ns = Given(chunk, row, bytes_of(action)), now_ns
+        self._held_ns = None
         self._commands += 1
+
+    def held(self, at_ns: int = NEVER_NS) -> None:
+        """The watchdog holds, or a clock is doubted, and then nobody knows since when.
+
+        What is held and goes on at one moment was not interrupted.
+        """
+        self._held_ns = at_ns if self._held_ns is None else min(self._held_ns, at_ns)
 
     def forget(self) -> None:
         """A person moves the arm, or has: no command says where it is."""
@@ -75,18 +88,24 @@ class Continuity:
             row: The row.
             now_ns: Time.
         """
-        last, given_ns = self._last, self.given_ns
+        last, holds = self._last, self._holds(now_ns, about.times.period_ns)
         if last is not None and last.chunk is chunk:
-            return row == last.row + 1
+            return row == last.row + 1 and holds == 0
         if row != about.checked_rows[0]:
             return False
-        if last is None or given_ns is None:
+        if last is None:
             return True
-        holds = round((now_ns - given_ns) / about.times.period_ns) - 1
         context = getattr(chunk, "context", None)
         told = bytes_of(getattr(context, "last_action", None))
-        before = self._commands - 1 + max(holds, 0)
+        before = self._commands - 1 + holds
         return told == last.action and rests(context, holds) and knows(context, before)
+
+    def _holds(self, now_ns: int, period_ns: int) -> int:
+        """Periods for which the arm was held since the last command."""
+        if self.given_ns is None:
+            return 0
+        held = self._held_ns is not None and self._held_ns < now_ns
+        return max(round((now_ns - self.given_ns) / period_ns) - 1, int(held))
 
 
 def rests(context: object, holds: int) -> bool:

@@ -20,6 +20,7 @@ from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS
 from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import SupervisorState
 from genpolicy.feasibility.admission import Admitted
 
 
@@ -175,6 +176,8 @@ class Executor(Informed):
         if doubt := self._journal.doubt:
             self.stub.supervisor.doubt(now_ns, doubt)
             return self._hold(now_ns, doubt)
+        if self.stub.supervisor.state is SupervisorState.WATCHDOG_HOLD:  # since before this tick
+            self._queue.continuity.held()
         self.stub.poll(now_s)
         self._heed_supervisor(now_ns)
         view = self._present()

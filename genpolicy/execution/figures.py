@@ -24,4 +24,5 @@ def expected_settings(cell: Cell) -> ExpectedSettings:
         maximum_divergence_m=execution.maximum_divergence_m,
         maximum_scene_shift_m=execution.maximum_scene_shift_m,
         deadline_s=execution.deadline_s,
+        silence_stop_s=execution.silence_stop_s,
     )

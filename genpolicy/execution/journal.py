@@ -22,9 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.latency import Term
 from genpolicy.errors import BadInputError, ContractError
+from genpolicy.execution.believed import BelievedClock
 from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.event_schemas import event_schema, schema_name
-from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, ns_or_none, to_ns
+from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -32,9 +33,6 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 Array = NDArray[np.float64]
 
 JOURNAL_VERSION = 11
-CLOCK_AHEAD = "clock_ahead"
-LONGEST_JUMP_NS = 60 * NS_PER_S
-"""No component of a session is silent for longer; a clock that is further ahead is doubted."""
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in such a piece
 
@@ -94,60 +92,22 @@ class Event:
     payload: dict[str, Any]
 
 
-class Journal:
-    """Append-only events of one session.
+class Journal(BelievedClock):
+    """Append-only events of one session, on the clock that they are dated by.
 
     Args:
         session: Name of the rollout, unique within a file.
         labels: Free text about it (method, perturbation, start), written with the first event.
-
-    Attributes:
-        latest_ns: The newest time that was believed.
-        doubt: Why the time given last is not believed: `no_time`, `clock_backwards`,
-            `clock_ahead`; empty where it is.
-        doubts: How many were not.
     """
 
     def __init__(self, session: str, labels: Mapping[str, str] | None = None) -> None:
+        super().__init__()
         self.session = session
         self.labels = dict(labels or {})
-        self.latest_ns = NEVER_NS
-        self.doubt = ""
-        self.doubts = 0
         self._events: list[tuple[str, int, dict[str, Any]]] = []
 
     def __len__(self) -> int:
         return len(self._events)
-
-    def clock(self, now_s: float) -> int:
-        """Now in ns, for every component of the session; whatever is given, it never raises.
-
-        A stop must not depend on a valid argument, and one wrong reading must not end a session:
-        what is no time, lies before an earlier now or far after it is counted and not believed;
-        the answer is the newest time that was.
-        """
-        now_ns = ns_or_none(now_s)
-        self.doubt = self._doubt(now_ns)
-        if now_ns is None or self.doubt:
-            self.doubts += 1
-        else:
-            self.latest_ns = now_ns
-        return self.latest_ns
-
-    def believe(self, now_s: float) -> int:
-        """The same, where a person says what time it is: a clock far ahead is right then."""
-        now_ns = ns_or_none(now_s)
-        if now_ns is not None:
-            self.latest_ns = max(self.latest_ns, now_ns)
-        return self.clock(now_s)
-
-    def _doubt(self, now_ns: int | None) -> str:
-        if now_ns is None:
-            return "no_time"
-        if now_ns < self.latest_ns:
-            return "clock_backwards"
-        begun = self.latest_ns != NEVER_NS
-        return CLOCK_AHEAD if begun and now_ns - self.latest_ns > LONGEST_JUMP_NS else ""
 
     def add(self, kind: str, time_ns: int, payload: dict[str, Any]) -> None:
         """Append an event; the payload is kept, not copied, and must not change afterwards."""

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+WATCHDOG = "watchdog"
+"""Why the controller holds where nobody commanded for too long."""
+
 
 class ControllerStub:
     """Accepts or refuses one action at a time.
@@ -128,10 +131,14 @@ class ControllerStub:
             self.supervisor.doubt(now_ns, self._journal.doubt)
             self.hold(now_ns, self._journal.doubt)
         elif self.supervisor.poll(now_ns):
-            self.hold(now_ns, "watchdog")
+            self.hold(now_ns, WATCHDOG)
 
     def hold(self, now_ns: int, reason: str) -> None:
         """The controller keeps its last target."""
+        if self._journal.doubt:
+            self._continuity.held()
+        elif reason == WATCHDOG:
+            self._continuity.held(now_ns)
         self._journal.add("hold", now_ns, {"reason": reason})
 
     def offer(

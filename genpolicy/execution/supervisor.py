@@ -9,14 +9,16 @@ session cannot know whether a stop stood: it begins stopped.
 import math
 from enum import StrEnum
 from numbers import Real
+from typing import NoReturn
 
 import numpy as np
 
 from genpolicy.contract.names import says
 from genpolicy.errors import ContractError
+from genpolicy.execution.believed import CLOCK_AHEAD
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
-from genpolicy.execution.journal import CLOCK_AHEAD, Journal
+from genpolicy.execution.journal import Journal
 from genpolicy.execution.moment import Moment
 from genpolicy.execution.nanoseconds import to_ns
 
@@ -31,8 +33,14 @@ class SupervisorState(StrEnum):
 
 
 STOPPED = frozenset({SupervisorState.PROTECTIVE_STOP, SupervisorState.EMERGENCY_STOP})
+RESET_REFUSED = "reset_refused"
+"""What a supervisor says of a person who resets at a time that is doubted; it changes nothing."""
 FLAGS = (bool, np.bool_)
 LONGEST_TEXT = 120
+
+
+class DoubtedTimeError(ContractError):
+    """A person resets at a time that the session does not believe."""
 
 
 class Supervisor:
@@ -112,10 +120,13 @@ class Supervisor:
     def human_reset(self, now_s: float, person: str) -> None:
         """Clear a stop; the only way back to RUN, and it needs a name.
 
-        A clock that is far ahead is believed from here on: a person has looked.
+        A clock that stays far ahead is believed from here on: a person has looked. At any other
+        time that is doubted nothing is cleared: nobody would know what was seen before.
 
         Raises:
             ContractError: No person is named.
+            DoubtedTimeError: The time is not believed, on record as `reset_refused`. Where the
+                session has believed a clock that was ahead, the person ends it and begins another.
         """
         if not says(person):
             raise ContractError(
@@ -125,11 +136,25 @@ class Supervisor:
                 action="Nothing but a person may clear a stop.",
             )
         now_ns = self._journal.believe(now_s)
+        if self._journal.doubt:
+            self._refuse(now_ns, now_s, person)
         if self.stopped:
             self._last_accept_ns = None  # it stands still until the next accepted command
         self.state = SupervisorState.RUN
         self.resumed_ns = now_ns
         self._record(now_ns, "human_reset", person)
+
+    def _refuse(self, now_ns: int, now_s: float, person: str) -> NoReturn:
+        beside, lost = self._journal.beside(now_s), self._journal.is_lost(now_s)
+        self._record(now_ns, RESET_REFUSED, f"{self._journal.doubt}, {beside}, by {person}")
+        again = "Look at the clock; where it is right, reset again."
+        over = "this session believed a clock that was ahead: end it, and begin another one."
+        raise DoubtedTimeError(
+            where="the time of a supervisor reset",
+            found=beside,
+            expected="one that the session believes",
+            action=f"Look at the clock; where it is right, {over}" if lost else again,
+        )
 
     def note_accepted(self, now_ns: int) -> None:
         """An accepted command: feeds the watchdog and ends a watchdog hold, never a stop."""

@@ -5,9 +5,9 @@ about freshness: phase, calibration, newest observation, voiding events and stop
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, P8 a person has the arm
-(`attended`), `clock` (no answer before its time), `sensor` (nothing seen before it arrived),
-`state` (what was measured), `conservation`, `journal` (form), `settings` (declared limits).
+P6 feasible (of a blend by its own admission, `joined`), P7 stop is sticky (`silence` is one), P8 a
+person has the arm (`attended`), `clock` (no answer before its time), `sensor` (nothing seen before
+it arrived), `state` (what was measured), `conservation`, `journal` (form), `settings` (limits).
 """
 
 import hashlib
@@ -18,6 +18,7 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.attended import Attended
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
+from genpolicy.verification.dated import NEVER_NS, misdated
 from genpolicy.verification.expected import ALWAYS, ExpectedSettings
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.joined import Joined
@@ -25,6 +26,7 @@ from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.measured import Measured
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
+from genpolicy.verification.silence import Silence
 from genpolicy.verification.world_view import WorldView
 
 LAYERS = 6
@@ -87,11 +89,12 @@ class _Session:
         self.joined = Joined()
         self.attended = Attended()
         self.measured = Measured(proof)
+        self.silence = Silence(expected.silence_stop_s if expected else None)
         self.continuity = Continuity(proof)
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.head: tuple[int, str] | None = None
-        self.n, self.t = -1, -(1 << 62)
+        self.n, self.t = -1, NEVER_NS
         self.ended, self.last_sequence = False, -1
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
@@ -112,8 +115,7 @@ class _Session:
         if m.get("n") != self.n + 1:
             self.flag("journal.gap", f"Event {m.get('n')} follows event {self.n}.")
         self.n = m.get("n", self.n + 1)
-        if m["t"] < self.t:
-            self.flag("journal.time", f"Time goes back from {self.t} ns to {m['t']} ns.")
+        self._flag_all(misdated(self.t, kind, m))
         self.t = m["t"]
         late_arrival = kind == "discard" and m.get("reason") == "end_of_episode"
         # A stop is heard at any time.
@@ -122,9 +124,8 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
-            self._flag_all(self.invocations.follow(kind, m))
-            self._flag_all(self.attended.follow(kind, m))
-            self._flag_all(self.measured.follow(kind, m))
+            for part in (self.invocations, self.attended, self.measured, self.silence):
+                self._flag_all(part.follow(kind, m))
             self._follow(kind, m)
             self._flag_all(self.joined.follow(kind, m, self.world.void_before, self.settings))
         except Exception as error:  # of what was forged, reading may raise anything
@@ -144,6 +145,7 @@ class _Session:
             self.unanswered_ns = self.t
         elif kind == "hold":
             self._answered(self.t)
+            self.continuity.hold(m)
             self.unanswered_ns = None
         elif kind == "session":
             self._check_settings(m)
@@ -191,10 +193,8 @@ class _Session:
     # P1, P3, P5, P7: accepted actions ----------------------------------------------------------
 
     def _check_accept(self, kind: str, m: Message) -> None:
-        if kind == "accept":
-            self.report.checked_actions += 1
-        else:
-            self.report.checked_fallback_actions += 1
+        self.report.checked_actions += kind == "accept"
+        self.report.checked_fallback_actions += kind == "fallback"
         chunk = self.open.get(m["arrival"])
         if chunk is None or chunk["chunk_id"] != m["chunk_id"]:
             self.flag("P1.admitted", f"{m['chunk_id']!r} is not an enqueued, open chunk.")

@@ -4,6 +4,11 @@ A chunk says from which commands it was checked; its rows were checked one after
 the controller was given must go that way, whatever the clock says. Where the robot is known, the
 joints that a chunk says were commanded must be those commands: speed, acceleration and jerk of its
 first rows were checked from these joints, and from none that it leaves out.
+
+After a hold the arm stands, and what goes on from there was checked from rest, never as the rest of
+a chunk. It was held where half a period or more is missing between two actions, and where the
+journal says that the watchdog held before the second one, or that a clock was doubted: how long
+that took no time on record says.
 """
 
 import struct
@@ -22,6 +27,9 @@ from genpolicy.verification.motion import POSE_TOLERANCE_M, POSE_TOLERANCE_RAD, 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
 RULE, PACE, COMMANDS = "P5.continuity", "P5.pace", "P6.commands"
+LATE, DUE = 3, 2
+"""Two actions three halves of a period apart, or further, have a hold between them."""
+DOUBTED = ("no_time", "clock_backwards", "clock_ahead")
 REMEMBERED = 3
 """The last command and two before it: what jerk at a boundary rests on."""
 
@@ -37,6 +45,7 @@ class Continuity:
         self._proof = proof
         self._last: tuple[int, int, str] | None = None
         self._accepted_ns: int | None = None
+        self._since_ns: list[int] = []
         self._given: deque[tuple[int, Array, Array]] = deque(maxlen=REMEMBERED)
 
     def forget(self) -> None:
@@ -44,19 +53,30 @@ class Continuity:
         self._last = None
         self._given.clear()
 
+    def hold(self, m: Message) -> None:
+        """Take in that the controller held."""
+        if m["reason"] in DOUBTED:
+            self._since_ns.append(-(1 << 62))
+        elif m["reason"] == "watchdog":
+            self._since_ns.append(m["t"])
+
     def follow(self, chunk: Message, m: Message, period_ns: int) -> Iterator[Finding]:
         """Take an accepted action of a chunk in; yields what nobody checked about it."""
         last, motion, row = self._last, chunk["motion"], m["row"]
+        stood = any(at_ns < m["t"] for at_ns in self._since_ns)
+        self._since_ns.clear()
         if last is not None and last[0] == m["arrival"]:
             if row != last[1] + 1:
                 yield RULE, f"Row {row} follows row {last[1]}: nobody checked that step."
+            elif stood or DUE * (m["t"] - (self._accepted_ns or 0)) >= LATE * period_ns:
+                yield RULE, f"Row {row} of {chunk['chunk_id']!r} goes on after a hold."
         elif row != chunk["checked_rows"][0]:
             yield RULE, f"Row {row} comes first, and is not the first that was checked."
         elif last is not None and motion is not None and motion["last_action"] != last[2]:
             yield RULE, f"{chunk['chunk_id']!r} was checked from another command."
         since_ns = self._accepted_ns
         if last is not None and last[0] != m["arrival"] and motion is not None:
-            holds = round((m["t"] - (since_ns or 0)) / period_ns) - 1
+            holds = max(round((m["t"] - (since_ns or 0)) / period_ns) - 1, int(stood))
             if holds > 0 and not _stood_still(motion, holds):
                 yield RULE, f"{chunk['chunk_id']!r} was checked in motion, after {holds} holds."
         if since_ns is not None and 10 * (m["t"] - since_ns) < 9 * period_ns:
@@ -70,18 +90,20 @@ class Continuity:
         if motion["joints"] != joints or path.size != (behind - first) * joints:
             return  # a violation of its own (P6.ground)
         if begins:
-            yield from self._from_commands(chunk, m["t"], period_ns)
+            yield from self._from_commands(chunk, m["t"], period_ns, held=stood)
         if first <= row < behind:  # else another one (P1.checked_rows)
             q_rad = path.reshape(-1, joints)[row - first]
             self._given.append((m["t"], floats(m["action"]), q_rad))
 
-    def _from_commands(self, chunk: Message, now_ns: int, period_ns: int) -> Iterator[Finding]:
+    def _from_commands(
+        self, chunk: Message, now_ns: int, period_ns: int, *, held: bool
+    ) -> Iterator[Finding]:
         """Whether a chunk was checked from the commands that were in force, newest first."""
         assert self._proof is not None
         name, motion = repr(chunk["chunk_id"]), chunk["motion"]
         before_rad = floats(motion["q_before_rad"]).reshape(-1, motion["joints"])
         told_rad = [floats(motion["q_cmd_rad"]), *before_rad[::-1]][:REMEMBERED]
-        given = list(self._in_force(now_ns, period_ns))[:REMEMBERED]
+        given = list(self._in_force(now_ns, period_ns, held=held))[:REMEMBERED]
         if len(told_rad) < len(given):
             yield COMMANDS, f"{name} was checked from {len(told_rad)} of {len(given)} commands."
         if not given:
@@ -99,8 +121,12 @@ class Continuity:
             elif not np.all(np.abs(q_rad - given_rad) <= self._proof.expected.branch_rad):
                 yield COMMANDS, f"{name} was checked from joints of another branch."
 
-    def _in_force(self, now_ns: int, period_ns: int) -> Iterator[tuple[Array, Array]]:
+    def _in_force(
+        self, now_ns: int, period_ns: int, *, held: bool
+    ) -> Iterator[tuple[Array, Array]]:
         """Action and joints that were commanded in each period before now, newest first."""
+        if held:  # at least for one more, whatever the clock says
+            now_ns = max(now_ns, self._given[-1][0] + 2 * period_ns) if self._given else now_ns
         ends_ns = [now_ns, *(given_ns for given_ns, _, _ in list(self._given)[:0:-1])]
         return chain.from_iterable(
             repeat((action, q_rad), min(max(round((end - begun) / period_ns), 1), REMEMBERED))

@@ -30,6 +30,8 @@ class ExpectedSettings:
             checked; beyond it nothing of the chunk may be accepted.
         deadline_s: An invocation that has not answered so long after the exposure of what it saw
             is given up at the next tick. A journal does not declare it.
+        silence_stop_s: Silence after which the supervisor stops; None: it holds, however long. A
+            journal does not declare it.
     """
 
     execution_horizon: int
@@ -44,6 +46,7 @@ class ExpectedSettings:
     maximum_divergence_m: float
     maximum_scene_shift_m: float
     deadline_s: float
+    silence_stop_s: float | None = None
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""

@@ -46,7 +46,7 @@ class Stillness:
             return
         elif m["event"] == "watchdog":
             found = ("watchdog", m["detail"] if m["detail"] in DOUBTS else "silence")
-        elif m["state"] in STOPS:
+        elif m["state"] in STOPS and m["event"] != "reset_refused":
             found = ("stop", m["event"])
         else:
             return

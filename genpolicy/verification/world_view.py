@@ -18,7 +18,7 @@ ROUNDING_N = 1e-6
 STATES = frozenset({"run", "watchdog_hold", *STOP_STATES})
 STOPPING = frozenset({"force", "collision", "emergency_stop", "silence", "restarted"})
 """Events of a supervisor that leave it in a stop."""
-EVENTS = STOPPING | {"human_reset", "watchdog", "watchdog_recovered"}
+EVENTS = STOPPING | {"human_reset", "watchdog", "watchdog_recovered", "reset_refused"}
 CHANGES = ("phase", "epoch")
 MODES = ("run", "fallback", "intervention", "ended")
 VOIDING = (
@@ -298,6 +298,8 @@ class WorldView:
             return True  # a violation of its own, where it does not stop (P7.gate)
         if event == "watchdog":
             return (self._state, state) == ("run", "watchdog_hold")
+        if event == "reset_refused":
+            return state == self._state
         return state == "run" and (event == "human_reset" or self._state == "watchdog_hold")
 
     def _void(self, cause: str, before_ns: int, arrivals: int | None = None) -> None:

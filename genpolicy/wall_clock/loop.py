@@ -11,7 +11,7 @@ import select
 import time
 from collections.abc import Callable
 
-from genpolicy.execution.journal import LONGEST_JUMP_NS
+from genpolicy.execution.believed import LONGEST_JUMP_NS
 from genpolicy.execution.nanoseconds import NS_PER_S
 from genpolicy.wall_clock.admission import AdmissionThread
 from genpolicy.wall_clock.channel import Inbox, Outbox
@@ -79,7 +79,7 @@ class Loop:
             self._tick(now_s, row)
             if self._believed:
                 self.session.tally.late_s.append(now_s - due_s)
-            failed = failed or self._watch(now_s)
+            failed = self._watch(now_s, failed)
             row += 1
             due_s = max(row * self._period_s, now_s + SHORTEST_PERIOD * self._period_s)
         if self._operator.closed:
@@ -98,15 +98,15 @@ class Loop:
         self.session.journal.flush()
         self.ticks += 1
 
-    def _watch(self, now_s: float) -> str:
-        """E-stop once where the clock or the journal is lost. Returns for what."""
+    def _watch(self, now_s: float, before: str) -> str:
+        """E-stop once each time that the clock or the journal is lost. Returns for what."""
         silence_s = self.session.cell.execution.silence_stop_s or math.inf
         cause = ""
         if self._silent * self._period_s >= silence_s:
             cause = "no clock"
         elif self.session.journal.lost:
             cause = f"no journal: {self.session.journal.lost}"
-        if cause:
+        if cause and cause != before:
             self.session.fail(now_s, cause)
         return cause
 
@@ -140,8 +140,13 @@ class Loop:
         return [self._admission.descriptor, *(inbox.descriptor for inbox in inboxes)]
 
     def _heed(self) -> None:
-        """Obey the person; where every tick is late there is no other time to."""
+        """Obey the person; where every tick is late there is no other time to.
+
+        A clock that stood at the last tick and has not gone on tells the person no time either.
+        """
         session, now_s = self.session, self._now()
+        if now_s == self._last_s and not self._believed:
+            now_s = math.nan
         for payload in self._operator.read():
             operator = read_operator(payload)
             if operator is None:

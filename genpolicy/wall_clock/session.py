@@ -7,6 +7,7 @@ to where the recorded arm is, which clears no stop.
 """
 
 import math
+import sys
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -23,7 +24,7 @@ from genpolicy.execution.executor import Executor
 from genpolicy.execution.informed import UNKNOWN
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.stub import ControllerStub
-from genpolicy.execution.supervisor import Supervisor
+from genpolicy.execution.supervisor import DoubtedTimeError, Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
@@ -251,6 +252,10 @@ class SupervisedSession:
         else:
             try:
                 self.stub.supervisor.human_reset(now_s, operator.person)
+            except DoubtedTimeError as error:
+                with suppress(OSError, ValueError):  # of a log that is full or closed
+                    print(error, file=sys.stderr, flush=True)
+                self.tally.dropped[f"reset_{self.journal.doubt}"] += 1
             except ContractError:
                 self.tally.dropped["reset_without_a_person"] += 1
 

@@ -5,11 +5,15 @@ from genpolicy.execution.recovery import fallback_metadata
 from genpolicy.verification.checker import check_messages
 
 
-def judged(rig):
-    events = rig.end()
-    report = check_messages(
+def checked(events):
+    """What the independent checker says of a session."""
+    return check_messages(
         (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in events
     )
+
+
+def judged(rig):
+    report = checked(rig.end())
     assert {violation.rule for violation in report.violations} == {"settings.checks"}
     assert report.checks_missing == {"issued"}  # the rig's chunks are imitations, and it says so
     assert rig.executor.conservation().error == 0

@@ -52,6 +52,7 @@ class Model:
     position_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
     last_s: float | None = None
     chunk_id: str = ""
+    doubted: bool = False
 
     def saw(self, now_s: float, phase: str, epoch: str) -> None:
         """An observation was used: another phase or calibration voids what is older."""
@@ -87,9 +88,11 @@ class Model:
             f"{far_m:.3f} m from the last command": self.last_s is not None
             and not far_m <= 1.01 * STEP_M,
             "too soon after the last command": early,
+            "goes on after a hold": not begins
+            and (self.doubted or (self.last_s is not None and now_s - self.last_s >= 0.075 - 1e-9)),
         }
         self.position_m, self.last_s = action[:3].copy(), now_s
-        self.chunk_id = command.chunk_id
+        self.chunk_id, self.doubted = command.chunk_id, False
         return [name for name, holds in wrongs.items() if holds]
 
 
@@ -189,6 +192,7 @@ class Walk:
         if command.action is not None:
             metadata = self._metadata[command.chunk_id]
             self.wrongs += self.model.objections(self.rig, metadata, command, now_s)
+        self.model.doubted |= bool(self.rig.journal.doubt)
         whole = self.rng.random() < 0.9
         self.rig.now_ns += PERIOD_NS if whole else self.rng.choice((1, 17, 33)) * 1_000_000
 
@@ -243,6 +247,7 @@ class Walk:
 
     def _poll(self) -> None:
         self.rig.stub.poll(self._now())
+        self.model.doubted |= bool(self.rig.journal.doubt)
 
     def _stopped(self) -> None:
         if not self.rig.supervisor.stopped:

@@ -1,11 +1,16 @@
 """Whether the way from the last command to a row was checked; the answer never raises."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from playing import begin, checked, judged
 
+from genpolicy.evidence.shadow.rig import IMITATED, Rig
+from genpolicy.execution.checks import without
 from genpolicy.execution.continuity import Continuity, bytes_of, knows, rests
+from genpolicy.execution.nanoseconds import NEVER_NS
 
 ACTION = np.arange(10.0)
 
@@ -121,3 +126,91 @@ def test_a_chunk_was_checked_with_the_commands_before_the_last(given, told):
 @pytest.mark.parametrize("told", [None, "moving", [[0.0], [0.0, 1.0]]])
 def test_a_history_that_cannot_be_read_is_none(told):
     assert not knows(SimpleNamespace(q_cmd_history=told), 1) and knows(None, 0)
+
+
+MS = 1_000_000
+
+
+def at(rig, ms, *times_s):
+    """The command of a tick so many ms after the first; the clock says other things if it must."""
+    rig.now_ns = ms * MS
+    return [rig.executor.tick(time_s) for time_s in (times_s or (rig.now_s,))][-1]
+
+
+def interrupted(name, **tables):
+    """One row, then something in between, then the tick at which the next row is due."""
+    rig = Rig(watchdog_s=0.05, **tables)
+    begin(rig, ticks=1)
+    return rig, INTERRUPTIONS[name](rig)
+
+
+INTERRUPTIONS = {
+    "nearly two periods": lambda rig: at(rig, 99),
+    "half a period more": lambda rig: at(rig, 75),
+    "a tick just before the row is due": lambda rig: (at(rig, 49), at(rig, 99))[-1],
+    "no time": lambda rig: at(rig, 50, math.nan, rig.now_s),
+    "a clock that went back": lambda rig: at(rig, 50, -0.1, rig.now_s),
+    "a clock that leapt": lambda rig: at(rig, 50, 3600.0, rig.now_s),
+    "the controller's own watchdog": lambda rig: (
+        setattr(rig, "now_ns", 55 * MS), rig.stub.poll(rig.now_s), at(rig, 60))[-1],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INTERRUPTIONS)
+def test_after_a_hold_the_rest_of_a_chunk_needs_a_new_admission(name):
+    """It was checked as one motion, and the arm had stopped: from rest it is another one."""
+    rig, command = interrupted(name)
+    assert (command.kind, command.reason) == ("hold", "broken_predecessor")
+    assert rig.executor.conservation().rest_discarded == {"broken_predecessor": 1}
+    assert rig.executor.conservation().actions.discarded["broken_predecessor"] == 7
+    assert [c.kind for c in rig.run(2, predecessor_chunk_id="")] == ["action"] * 2
+    judged(rig)
+
+
+@pytest.mark.parametrize("name", INTERRUPTIONS)
+@pytest.mark.parametrize("blind", ["checks", "stub_checks"])
+def test_executor_and_stub_hear_of_a_hold_each_for_itself(name, blind):
+    tables = {"checks": IMITATED, "stub_checks": IMITATED}
+    rig, command = interrupted(name, **tables | {blind: without(IMITATED, "continuity")})
+    assert command.kind == "hold" and rig.stub.accepted == 1
+    assert rig.stub.stale == (blind == "checks")
+
+
+@pytest.mark.parametrize("name", INTERRUPTIONS)
+def test_the_checker_sees_it_where_nobody_asks(name):
+    rig, command = interrupted(name, checks=without(IMITATED, "continuity"))
+    assert command.kind == "action" and rig.stub.accepted == 2
+    found = {v.rule for v in checked(rig.end()).violations}
+    assert found == {"settings.checks", "P5.continuity"}
+
+
+@pytest.mark.parametrize("ms", [45, 50, 55, 74])
+def test_a_command_that_is_some_ms_early_or_late_is_no_hold(ms):
+    """Neither is the watchdog of this very tick: what it holds, it holds for no time."""
+    rig = Rig(watchdog_s=0.05)
+    rig.observe()
+    rig.deliver(rig.chunk())
+    shift = max(50 - ms, 0)  # the first comes so late that this one is not before its window
+    assert at(rig, shift).kind == "action" and at(rig, ms + shift).kind == "action"
+    judged(rig)
+
+
+def test_a_loop_may_ask_several_times_a_period():
+    """What is not due yet is held for; the arm goes on to where it was sent all the while."""
+    rig = Rig()
+    rig.observe()
+    rig.deliver(rig.chunk())
+    assert [at(rig, ms).reason for ms in range(0, 200, 10)] == ["", *["empty"] * 4] * 4
+    judged(rig)
+
+
+def test_after_a_hold_the_next_chunk_was_checked_from_rest():
+    """However short it was by the clock: one that is doubted measures no time."""
+    moving, rested = chunk(before=((0.0, 0.1), (0.0, 0.05))), chunk()
+    for held_ns, holds in ((None, True), (57, True), (56, False), (NEVER_NS, False)):
+        continuity = after(chunk())
+        for at_ns in () if held_ns is None else (held_ns, 57):
+            continuity.held(at_ns)
+        assert follows(continuity, moving, 0, 0) is holds and follows(continuity, rested, 0, 0)
+        continuity.note(57, rested, 0, ACTION)
+        assert follows(continuity, rested, 0, 1, 107), "the next command ends it"

@@ -7,7 +7,7 @@ from genpolicy.execution.figures import expected_settings
 
 OTHER = {
     "execution_horizon": 5, "watchdog_s": 0.2, "queue_capacity": 3, "deadline_s": 0.14,
-    "maximum_divergence_m": 0.07, "maximum_scene_shift_m": 0.03,
+    "maximum_divergence_m": 0.07, "maximum_scene_shift_m": 0.03, "silence_stop_s": 2.0,
 }  # fmt: skip
 
 
@@ -20,6 +20,7 @@ def test_what_a_session_declares_is_what_is_expected_of_it(changes):
     assert {name: declared[name] for name in held_to} == held_to
     assert expected.force_limit_n == rig.cell.execution.force_limit_n  # no journal declares these
     assert expected.deadline_s == rig.cell.execution.deadline_s
+    assert expected.silence_stop_s == rig.cell.execution.silence_stop_s
 
 
 def test_another_cell_is_another_expectation():

@@ -20,7 +20,6 @@ from genpolicy.execution.journal import (
     read_journal,
     write_journal,
 )
-from genpolicy.execution.nanoseconds import NEVER_NS
 from genpolicy.verification.checker import check_journal
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -110,30 +109,6 @@ def test_a_small_file_that_swells_beyond_a_record_is_refused(tmp_path, read):
     assert path.stat().st_size < 1 << 20
     with pytest.raises(BadInputError, match="whole MCAP journal"):
         read(path)
-
-
-def test_time_never_goes_back_within_a_session():
-    journal = Journal("s")
-    assert [journal.clock(t) for t in (1.0, 0.5, 2.0)] == [10**9, 10**9, 2 * 10**9]
-
-
-def test_what_is_no_time_is_counted_and_the_last_one_holds():
-    journal = Journal("s")
-    assert journal.clock(math.nan) == NEVER_NS and journal.doubt == "no_time"
-    assert journal.clock(1e9) == 10**18 and journal.doubt == ""  # the first may be any
-    for wrong, doubt in ((None, "no_time"), (0.5, "clock_backwards"), (1e9 + 61, "clock_ahead")):
-        assert journal.clock(wrong) == 10**18 and journal.doubt == doubt
-    assert journal.doubts == 4
-    assert journal.clock(1e9 + 60) == 10**18 + 60 * 10**9 and journal.doubt == ""
-
-
-def test_a_glitch_is_forgotten_and_a_clock_that_stays_ahead_needs_a_person():
-    journal = Journal("s")
-    assert [journal.clock(t) for t in (1.0, 3600.0, 1.05)] == [10**9, 10**9, 1_050_000_000]
-    assert journal.clock(3600.0) == 1_050_000_000
-    assert journal.believe(3600.0) == journal.clock(3600.0) == 3600 * 10**9
-    assert journal.believe(math.inf) == 3600 * 10**9 and journal.doubt == "no_time"
-    assert journal.believe(5.0) == 3600 * 10**9  # nobody can go back in time
 
 
 def test_the_newest_event_of_a_kind():

@@ -20,7 +20,8 @@ def test_nothing_wrong_reaches_the_controller(seed):
     ("check", "said", "first"),
     [
         ("continuity", "m from the last command", 0),
-        ("pace", "too soon after the last command", 0),
+        ("continuity", "goes on after a hold", 0),
+        ("pace", "too soon after the last command", 43),
         ("stopped", "a command while stopped", 0),
         ("intervention", "a command while a person commands", 0),
         ("phase_transition", "of another phase or calibration", 0),

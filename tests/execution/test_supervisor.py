@@ -244,7 +244,9 @@ def test_a_poll_with_a_clock_that_is_not_believed_is_silence(now_s):
     rig.stub.poll(now_s)
     assert rig.supervisor.state is SupervisorState.WATCHDOG_HOLD
     assert rig.executor.tick(now_s).kind == "hold"
-    assert rig.tick()[0].kind == "action" and rig.supervisor.state is SupervisorState.RUN
+    assert rig.tick()[0].reason == "broken_predecessor"  # the rest was checked in motion
+    assert rig.run(1, predecessor_chunk_id="")[0].kind == "action"
+    assert rig.supervisor.state is SupervisorState.RUN
 
 
 def test_a_clock_far_ahead_stops_where_silence_stops():

@@ -70,7 +70,7 @@ def test_after_somebody_else_moved_the_arm_no_command_binds():
     assert rules(start, (chunk(), accept(20, 0, arrival=1)), forget=1)[1] == [PACE]
 
 
-@pytest.mark.parametrize(("t", "found"), [(44, [PACE]), (45, []), (50, []), (99, []), (0, [PACE])])
+@pytest.mark.parametrize(("t", "found"), [(44, [PACE]), (45, []), (50, []), (74, []), (0, [PACE])])
 def test_the_pace_is_nine_tenths_of_a_period(t, found):
     own = chunk()
     assert rules((own, accept(0, 0)), (own, accept(t, 1)))[1] == found
@@ -86,6 +86,46 @@ def test_the_pace_is_nine_tenths_of_a_period(t, found):
 def test_after_holds_a_chunk_was_checked_from_an_arm_that_stood_still(t, before, found):
     start = (chunk(), accept(0, 0))
     assert rules(start, (chunk(before=before), accept(t, 0, arrival=1)))[1] == found
+
+
+HELD = [("watchdog", 0), ("watchdog", 49), ("no_time", 50), ("clock_backwards", 0),
+        ("clock_ahead", 0)]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("t", "found"), [(50, []), (74, []), (75, [RULE]), (99, [RULE]), (100, [RULE]), (900, [RULE])]
+)
+def test_after_a_hold_by_the_clock_no_row_of_the_same_chunk_follows(t, found):
+    own = chunk()
+    assert rules((own, accept(0, 0)), (own, accept(t, 1)))[1] == found
+
+
+@pytest.mark.parametrize(("reason", "t"), HELD)
+def test_after_a_hold_on_record_none_follows_and_another_one_was_checked_from_rest(reason, t):
+    """By the watchdog, earlier than the action; for a doubted clock, whatever that says."""
+    for second, found in (
+        ((chunk(), accept(50, 1)), [RULE]),
+        ((chunk(before=(0.0, 0.1)), accept(50, 0, arrival=1)), [RULE]),
+        ((chunk(), accept(50, 0, arrival=1)), []),
+    ):
+        own = Continuity()
+        assert not list(own.follow(chunk(), accept(0, 0), PERIOD))
+        own.hold({"t": t, "reason": reason})
+        own.hold({"t": 50, "reason": "watchdog"})
+        assert [rule for rule, _ in own.follow(*second, PERIOD)] == found
+        assert not list(
+            own.follow(
+                second[0], accept(100, second[1]["row"] + 1, arrival=second[1]["arrival"]), PERIOD
+            )
+        )
+
+
+@pytest.mark.parametrize(("reason", "t"), [("empty", 20), ("watchdog", 50)])
+def test_what_is_not_due_and_what_goes_on_at_once_is_no_hold(reason, t):
+    own = Continuity()
+    assert not list(own.follow(chunk(), accept(0, 0), PERIOD))
+    own.hold({"t": t, "reason": reason})
+    assert not list(own.follow(chunk(), accept(50, 1), PERIOD))
 
 
 class Slide:
@@ -112,13 +152,14 @@ def slid(q_cmd, before, *, rows=4):
     return {"chunk_id": "c", "checked_rows": [0, rows], "motion": ground}
 
 
-def slides(second, *, t=100, after=2, forget=False):
+def slides(second, *, t=100, after=2, forget=False, hold=""):
     """Findings of a chunk behind so many rows of one that began at 0."""
     own, first = Continuity(Slide()), slid((0.0, 0.0), [])
     for row in range(after):
         assert not list(own.follow(first, accept(50 * row, row, action=at(row + 1.0)), PERIOD))
     if forget:
         own.forget()
+    own.hold({"t": t, "reason": hold})
     found = own.follow(second, accept(t, 0, arrival=1, action=at(9.0)), PERIOD)
     return [rule for rule, _ in found]
 
@@ -147,6 +188,13 @@ def test_a_hold_counts_as_a_command():
     assert slides(slid((2.0, 0.0), [[2.0, 0.0]]), t=150) == [COMMANDS], "of three one is left out"
     assert slides(slid((2.0, 0.0), [[2.0, 0.0], [2.0, 0.0]]), t=150) == [COMMANDS]
     assert slides(slid((2.0, 0.0), [[2.0, 0.0], [2.0, 0.0]]), t=200) == []
+
+
+def test_a_doubted_clock_held_for_a_command_too_whatever_it_says():
+    assert slides(slid((2.0, 0.0), [[1.0, 0.0], [2.0, 0.0]]), hold="no_time") == []
+    assert slides(slid((2.0, 0.0), [[1.0, 0.0], [2.0, 0.0]]), t=150, hold="no_time") == []
+    moving = slides(slid((2.0, 0.0), [[0.5, 0.0], [1.0, 0.0]]), hold="no_time")
+    assert set(moving) == {RULE, COMMANDS}
 
 
 def test_who_moved_the_arm_left_the_commands_behind():

@@ -38,7 +38,7 @@ SILENT = {
     ("observation", "divergence_m"): "in a rollout it lies between state and command (`measured`)",
     ("scene", "bodies"): "in a rollout it is what the observation shows (`measured`)",
     ("supervisor", "detail"): "words for people; a person's name is asked for",
-    ("hold", "reason"): "words for people: nothing moves",
+    ("hold", "reason"): "words for people, where nothing of the same chunk moves behind it",
     ("recovery", "cause"): "words for people, and a column that tables are held to",
     ("recovery", "phase"): "a column that tables are held to",
     ("invocation", "id"): "a session without a clock owes no invocation anything (`invocations`)",

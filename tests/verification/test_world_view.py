@@ -102,6 +102,13 @@ def test_a_stop_stays_until_a_person_clears_it(view):
     for nobody in ("\u200b", "-", ""):
         assert supervise("force", "protective_stop") == []
         assert supervise("human_reset", "run", nobody) == ["P7.reset"]
+    assert supervise("reset_refused", "run", "no_time, no time, by Ann") == []
+    assert supervise("reset_refused", "protective_stop") == ["P7.state"]
+    assert supervise("reset_refused", "run") == ["P7.sticky"]
+    assert supervise("force", "protective_stop") == []
+    assert supervise("reset_refused", "protective_stop") == []
+    assert "P7.stop" in rules(view), "who was refused has cleared nothing"
+    assert supervise("human_reset", "run", "Ann") == []
     assert rules(view) == ["P1.void"]  # seen before the stop
     observed(view, 1150)
     assert rules(view, condition_ns=1150 * MS) == []

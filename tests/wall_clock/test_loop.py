@@ -20,6 +20,7 @@ class Session:
 
     def __init__(self):
         self.ticks, self.failed, self.obeyed, self.answers = [], [], [], []
+        self.obeyed_s = []
         self.tally, self.ended = Tally(), False
         self.journal = SimpleNamespace(doubt="", lost="", flush=lambda: None)
         self.cell = SimpleNamespace(
@@ -41,6 +42,7 @@ class Session:
 
     def obey(self, operator, now_s):
         self.obeyed.append(operator)
+        self.obeyed_s.append(now_s)
         self.ended = operator.order is Order.END
 
     def answer(self, answer, now_s, submit):
@@ -202,6 +204,35 @@ def test_silence_without_a_clock_is_an_emergency_stop_once(arranged):
     assert arranged.session.failed == ["no clock"]
     # So many periods without a time as the silence that stops has.
     assert len(arranged.time.slept) == ROWS - 1
+
+
+def test_a_clock_that_is_lost_again_stops_again(arranged):
+    """A person had cleared the first stop, and nobody stopped for the second silence."""
+    lost, of_time = itertools.count(), arranged.time
+    arranged.loop._rows = 4 * ROWS
+    arranged.loop._clock = lambda: float("nan") if next(lost) // 20 in (1, 3) else of_time()
+    arranged.run()
+    assert arranged.session.failed == ["no clock", "no clock"]
+
+
+@pytest.mark.parametrize(("stands", "told"), [(True, False), (False, True)])
+def test_a_clock_that_stands_tells_a_person_no_time(arranged, stands, told):
+    """Else a reset at that moment would clear the stop that it was stopped for."""
+    tick = arranged.session.tick
+
+    def then_reset(now_s, row):
+        if row == 2:
+            reset = Operator(Order.RESET, "ann").encoded()
+            os.write(arranged.operator, frame(reset))
+        return tick(now_s, row)
+
+    arranged.session.tick = then_reset
+    if stands:
+        loop_module.select.select = lambda *_: ([], [], [])
+        loop_module.time.sleep = lambda _: None
+    arranged.run()
+    (now_s,) = arranged.session.obeyed_s
+    assert (now_s == now_s) is told
 
 
 def test_a_journal_that_is_lost_is_an_emergency_stop_once(arranged):

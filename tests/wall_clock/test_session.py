@@ -255,6 +255,20 @@ def test_a_person_stops_and_only_a_named_one_resets(told):
     assert told.checked() == set()
 
 
+def test_a_person_who_resets_on_a_doubted_clock_is_told_so(told, capsys):
+    told.tick()
+    told.session.obey(Operator(Order.EMERGENCY_STOP, "Ann"), 0.03)
+    for now_s, why in ((3600.0, "clock_ahead"), (0.01, "clock_backwards"), (math.nan, "no_time")):
+        told.session.obey(Operator(Order.RESET, "Ann"), now_s)
+        assert told.session.stub.supervisor.stopped
+        assert told.session.tally.dropped[f"reset_{why}"] == 1
+        assert "the time of a supervisor reset is" in capsys.readouterr().err
+    told.session.obey(Operator(Order.RESET, "Ann"), 0.05)
+    assert not told.session.stub.supervisor.stopped
+    told.end()
+    assert told.checked() == set()
+
+
 def test_one_that_follows_a_stop_begins_stopped(kit, task, checker, standing, tmp_path):
     told = begin(kit, task, checker, standing, tmp_path, stop_stands=True)
     assert told.tick() is None and told.session.stub.supervisor.stopped

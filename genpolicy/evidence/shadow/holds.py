@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from genpolicy.evidence.rows.shadow import ShadowHoldRow
-from genpolicy.execution.journal import CLOCK_AHEAD, Journal
-from genpolicy.execution.supervisor import STOPPED
+from genpolicy.execution.believed import CLOCK_AHEAD, CLOCK_BACKWARDS, NO_TIME
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.supervisor import RESET_REFUSED, STOPPED
 
 HOLD, DOUBT, WATCHDOG, STOP = "hold", "doubt", "watchdog", "stop"
-DOUBTS = ("no_time", "clock_backwards", CLOCK_AHEAD)
+DOUBTS = (NO_TIME, CLOCK_BACKWARDS, CLOCK_AHEAD)
 """Why a time is not believed, as `Journal.doubt` says it."""
 SILENCE = "silence"
 
@@ -40,5 +41,7 @@ def _still(journal: Journal) -> Iterator[tuple[str, str, str]]:
         elif event.kind == "supervisor" and payload["event"] == "watchdog":
             detail = payload["detail"]
             yield phase, WATCHDOG, detail if detail in DOUBTS else SILENCE
+        elif event.kind == "supervisor" and payload["event"] == RESET_REFUSED:
+            continue  # the stop stood before
         elif event.kind == "supervisor" and payload["state"] in STOPPED:
             yield phase, STOP, payload["event"]

@@ -251,24 +251,24 @@ def _newer_chunk(rig: Rig) -> None:
     rig.tick(2)
 
 
-def _paused(rig: Rig) -> None:
-    rig.advance(0.3)
-
-
 def _a_row_left_out(rig: Rig) -> None:
     _begin(rig)
     rig.advance(0.05)
     rig.tick(1)
 
 
-def _two_at_once(rig: Rig) -> None:
-    """The end of one window, and the begin of the next."""
-    rig.observe()
-    rig.deliver(rig.chunk())
-    rig.advance(0.04)
-    rig.tick(1)
-    rig.now_ns -= 40_000_000
-    rig.tick(1)
+def _late_and_then(next_ms: int) -> Scenario:
+    """A command 40 ms late in its window of 50, and a tick so many ms behind its begin."""
+
+    def scenario(rig: Rig) -> None:
+        rig.observe()
+        rig.deliver(rig.chunk())
+        rig.advance(0.04)
+        rig.tick(1)
+        rig.now_ns = next_ms * 1_000_000
+        rig.tick(1)
+
+    return scenario
 
 
 def _diverged(rig: Rig) -> None:
@@ -328,7 +328,7 @@ SCENARIOS: dict[str, Scenario] = {
     "intervention": _new_chunk_under_a_person,
     "late_chunk": _late_in_contact,
     "out_of_order": _one_window_twice,
-    "pace": _two_at_once,
+    "pace": _late_and_then(50),
     "period": _bad(action_period_s=0.1),
     "issued": _bad(verdict=replace(passing_verdict(), q_rad=cast(Any, None))),
     "phase_transition": _bad(task_phase="insert"),
@@ -343,6 +343,6 @@ SCENARIOS: dict[str, Scenario] = {
     "stale_observation": _frozen_camera,
     "stopped": _new_chunk_while_stopped,
     "superseded": _newer_chunk,
-    "watchdog": _then(_paused),
-    "window": _then(_paused),
+    "watchdog": _then(lambda rig: rig.advance(0.3)),
+    "window": _late_and_then(100),
 }

@@ -49,6 +49,7 @@ def sessions():
     hold(other, "stopped")
     supervisor(other, "force", "protective_stop", "90 N")
     supervisor(other, "emergency_stop", "emergency_stop")
+    supervisor(other, "reset_refused", "emergency_stop", "no_time, no time, by Ann")
     supervisor(other, "human_reset", "run", "spotter")
     return [first, second, other]
 
