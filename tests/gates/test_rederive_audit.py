@@ -212,6 +212,10 @@ def test_a_mean_of_few_situations_of_the_forests_is_not_asked_and_how_many_they_
     for folder in folders:
         put(folder, "sides", 1, analysed=9)
     hold_audit(stated, again)
+    put(stated, "sides", 1, resolved=GROWN_COUNT + 1)
+    with pytest.raises(RefusedError, match="learned: resolved is"):
+        hold_audit(stated, again)
+    put(stated, "sides", 1, resolved=0)
     for folder in folders:
         put(folder, "sides", 0, kept_n=9)
     put(stated, "sides", 0, kept=0.1)
