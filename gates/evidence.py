@@ -54,6 +54,7 @@ class Evidence:
         self._materials: dict[str, str] = {}
         self._tables: dict[str, pa.Table] = {}
         self._frames: dict[tuple[str, bool], pd.DataFrame] = {}
+        self._of: dict[tuple[str, str], pd.DataFrame] = {}
         self._documents: dict[str, Any] = {}
         self._touched: dict[str, None] = {}
         self._whole: set[tuple[str, type]] = set()
@@ -114,14 +115,16 @@ class Evidence:
         return self._frames[path, lists]
 
     def of(self, path: str, row: type, method: str) -> pd.DataFrame:
-        """Rows of one method; as `rows`.
+        """Rows of one method; as `rows`, and kept as they are.
 
         Raises:
             MissingEvidenceError: No such file, column or row.
             IntegrityError: An unknown column, or no whole table.
         """
         frame = self.rows(path, row)
-        found = frame[frame["method"] == method]
+        if (path, method) not in self._of:
+            self._of[path, method] = frame[frame["method"] == method]
+        found = self._of[path, method]
         if len(found) == 0:
             raise MissingEvidenceError(f"{path} has no rows of {method}")
         return found

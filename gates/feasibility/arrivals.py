@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+import numpy as np
 import pandas as pd
 
 from gates.again import changed_since_gate_b
@@ -148,13 +149,14 @@ def unaccounted(frame: pd.DataFrame, keys: list[str]) -> float:
         MissingEvidenceError: A run states its totals differently in different rows, or a count
             is below zero.
     """
-    error = 0.0
-    for name in ("generated", "executed", "queued", "count"):
-        frame = frame.assign(**{name: counts(frame, name)})
-    for run, rows in frame.groupby(keys):
-        totals = rows[["generated", "executed", "queued"]].drop_duplicates()
-        if len(totals) != 1:
-            raise MissingEvidenceError(f"{run} states several totals")
-        generated, executed, queued = (float(value) for value in totals.iloc[0])
-        error += abs(generated - executed - queued - float(rows["count"].sum()))
-    return error
+    names = ("generated", "executed", "queued", "count")
+    stated = np.stack([counts(frame, name) for name in names], axis=1)
+    runs = frame[keys].groupby(keys)
+    _, first, member = np.unique(runs.ngroup(), return_index=True, return_inverse=True)
+    totals = stated[first, :3]
+    other = np.flatnonzero(np.any(stated[:, :3] != totals[member], axis=1))
+    if len(other):
+        run = [run for run, _ in runs][int(member[other].min())]
+        raise MissingEvidenceError(f"{run} states several totals")
+    counted = np.bincount(member, weights=stated[:, 3], minlength=len(first))
+    return float(sum(abs(totals[:, 0] - totals[:, 1] - totals[:, 2] - counted)))

@@ -41,7 +41,10 @@ def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
 
 
 def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
-    rows = HELD_OUT_ROWS.of(_rows(evidence, candidate))
+    # Most measures of the gate ask for them.
+    rows = evidence.once(
+        ("held out", candidate), lambda: HELD_OUT_ROWS.of(_rows(evidence, candidate))
+    )
     if len(rows) == 0:
         raise MissingEvidenceError("no held-out observation was sampled")
     return rows

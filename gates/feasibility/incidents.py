@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from gates.asked_for import INCIDENTS_ASKED_FOR, OF_TWO
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, counts
+from gates.evidence import Array, Evidence, MissingEvidenceError, counts
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 
@@ -58,21 +60,31 @@ def counted(evidence: Evidence, method: str) -> list[Counted]:
     absent = sorted(set(INCIDENTS_ASKED_FOR) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"not tried: {', '.join(absent)}")
-    rows = rows.assign(**{name: counts(rows, name) for name in ("generated", "executed", "count")})
+    stated = np.stack([counts(rows, name) for name in ("generated", "executed", "count")], axis=1)
+    reasons, fixtures = rows["reason"].to_numpy(), rows["fixture"].to_numpy()
+    arrived, played = stub[["stale", "invalid", "arrivals"]], stub["fixture"].to_numpy()
     return [
-        _counted(name, reason, rows[rows["fixture"] == name], stub[stub["fixture"] == name])
+        _counted(
+            name,
+            reason,
+            stated[fixtures == name],
+            reasons[fixtures == name] == reason,
+            arrived[played == name],
+        )
         for name, reason in INCIDENTS_ASKED_FOR.items()
     ]
 
 
-def _counted(name: str, reason: str, rows: pd.DataFrame, stub: pd.DataFrame) -> Counted:
-    totals = rows[["generated", "executed"]].drop_duplicates()
-    if len(totals) != 1:
+def _counted(
+    name: str, reason: str, stated: Array, hit: NDArray[np.bool_], stub: pd.DataFrame
+) -> Counted:
+    """One incident: generated, executed and counted in each row, and which of them say why."""
+    if not np.all(stated[:, :2] == stated[0, :2]):
         raise MissingEvidenceError(f"{name} states several totals")
-    generated, executed = (float(value) for value in totals.iloc[0])
+    generated, executed = (float(value) for value in stated[0, :2])
     if not generated > 0:
         raise MissingEvidenceError(f"not tried: {name}")
-    found = float(rows["count"][rows["reason"] == reason].sum())
+    found = float(stated[hit, 2].sum())
     if name in OF_TWO:
         half = generated / 2
         refused = counts(stub, "stale").sum() + counts(stub, "invalid").sum()

@@ -7,9 +7,11 @@ believed: who writes down what was measured as what was drawn has a model that i
 
 import functools
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from gates.evidence import Array, MissingEvidenceError
 from gates.reproducibility.latency_budget import MEASURED_HERE, WARM
@@ -78,28 +80,58 @@ def quantiles_of(
     rows: pd.DataFrame, model: pd.DataFrame, uniform: dict[str, Array]
 ) -> Iterator[tuple[float, float]]:
     """Measured and drawn quantile of each row of the model; NaN of a process that was not timed."""
+    spans, taken = _spans_of(rows), {term: _taken(rows, term) for term in uniform}
     known: dict[tuple[int, int], tuple[Array, Array]] = {}
     for run, process, level in zip(model["run"], model["process"], model["level"], strict=True):
-        if (run, process) not in known:
-            known[run, process] = _spans(rows, int(run), int(process), uniform)
+        if (key := (int(run), int(process))) not in known:
+            known[key] = spans.of(*key), _drawn_without(taken, uniform, *key)
         yield tuple(  # type: ignore[misc]
-            float(np.quantile(spans, level, method="higher")) if len(spans) else np.nan
-            for spans in known[run, process]
+            float(np.quantile(found, level, method="higher")) if len(found) else np.nan
+            for found in known[key]
         )
 
 
-def _spans(
-    rows: pd.DataFrame, run: int, process: int, uniform: dict[str, Array]
-) -> tuple[Array, Array]:
-    """What invocations of a process took, and those drawn from all other processes, s."""
-    own = (rows["run"] == run) & (rows["process"] == process)
-    measured = rows[own].groupby("repeat")["seconds"].sum().to_numpy()
-    # A term that somebody behind the wire does not time is part of another one.
-    others = rows[~own].fillna({"seconds": 0.0})
+@dataclass(frozen=True)
+class _Timed:
+    """Times, each of a process of a run. Shape (n,) each."""
+
+    run: NDArray[np.generic]
+    process: NDArray[np.generic]
+    seconds: Array
+
+    def own(self, run: int, process: int) -> NDArray[np.bool_]:
+        """Which of them are of a process. Shape (n,)."""
+        return np.asarray((self.run == run) & (self.process == process), dtype=np.bool_)
+
+    def of(self, run: int, process: int) -> Array:
+        """Those of a process."""
+        return self.seconds[self.own(run, process)]
+
+
+def _spans_of(rows: pd.DataFrame) -> _Timed:
+    """What each invocation took, in order of its repeat."""
+    sums = rows.groupby(["run", "process", "repeat"])["seconds"].sum()
+    run, process = (sums.index.get_level_values(name).to_numpy() for name in ("run", "process"))
+    return _Timed(run, process, sums.to_numpy())
+
+
+def _taken(rows: pd.DataFrame, term: str) -> _Timed:
+    """What a term took, in ascending order; one that nobody times behind the wire is 0."""
+    own = rows[rows["component"] == term]
+    seconds = own["seconds"].fillna(0.0).to_numpy(dtype=np.float64)
+    order = np.argsort(seconds, kind="stable")
+    run, process = own["run"].to_numpy()[order], own["process"].to_numpy()[order]
+    return _Timed(run, process, seconds[order])
+
+
+def _drawn_without(
+    taken: dict[str, _Timed], uniform: dict[str, Array], run: int, process: int
+) -> Array:
+    """What invocations take that are drawn from all processes but one, s; none without a term."""
     drawn = np.zeros(DRAWN)
     for term, at in uniform.items():
-        taken = np.sort(others.loc[others["component"] == term, "seconds"].to_numpy())
-        if len(taken) == 0:
-            return measured, np.empty(0)
-        drawn += taken[np.minimum(len(taken) - 1, (at * len(taken)).astype(np.int64))]
-    return measured, drawn
+        others = taken[term].seconds[~taken[term].own(run, process)]
+        if len(others) == 0:
+            return np.empty(0)
+        drawn += others[np.minimum(len(others) - 1, (at * len(others)).astype(np.int64))]
+    return drawn

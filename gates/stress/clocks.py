@@ -177,16 +177,16 @@ def _ages(
     kept = ages.merge(invocations[key], on=key)
     periods = np.rint(numbers(kept, "age_s") / settings.action_period_s).astype(int)
     values = np.arange(int(periods.max(initial=0)) + 1)
+    clocks, of = kept["clock"].to_numpy(), kept["episode"].to_numpy()
     counts = {
         clock: np.stack(
             [
-                (periods[((kept["clock"] == clock) & (kept["episode"] == one)).to_numpy()][:, None]
-                 == values).sum(axis=0)
+                (periods[(clocks == clock) & (of == one)][:, None] == values).sum(axis=0)
                 for one in episodes
             ]
         ).astype(np.float64)
         for clock in (WALL, VIRTUAL)
-    }  # fmt: skip
+    }
     _, low, high = distance_interval(
         counts[WALL], counts[VIRTUAL], confidence=_coverage(settings),
         rng=stream(settings.root_seed, "clocks", candidate, AGE),

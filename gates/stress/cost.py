@@ -190,10 +190,13 @@ def _share_of(  # noqa: PLR0917
             raise MissingEvidenceError(f"{_uninvoked(rows, condition)}: a share of none is unknown")
         if np.any(all_of <= 0) or np.any(hits > all_of) or np.any(hits < 0):
             raise MissingEvidenceError(f"{part} is no part of {whole}")
-        sums = rows.assign(hits=hits, all_of=all_of).groupby("start")[["hits", "all_of"]].sum()
+        starts, member = np.unique(rows["start"].to_numpy(), return_inverse=True)
+        parts, wholes = np.zeros(len(starts)), np.zeros(len(starts))
+        np.add.at(parts, member, hits)
+        np.add.at(wholes, member, all_of)
         ends = ratio_interval(
-            sums["hits"].to_numpy(),
-            sums["all_of"].to_numpy(),
+            parts,
+            wholes,
             confidence=settings.confidence,
             rng=settings.draws("D", part, candidate, condition),
         )

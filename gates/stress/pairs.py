@@ -6,6 +6,7 @@ import pandas as pd
 from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.stress.rollouts import StressSettings, rollouts
 from gates.stress.utility import utilities
+from gates.stress.weights import by_cost
 
 
 def paired_differences(
@@ -58,7 +59,14 @@ def worth_by_start(evidence: Evidence, settings: StressSettings, method: str) ->
 def _by_start_and_condition(
     evidence: Evidence, settings: StressSettings, method: str
 ) -> "pd.Series[float]":
-    """Mean over training seeds, by start and condition."""
-    rows = rollouts(evidence, settings, method)
-    rows = rows.assign(worth=utilities(evidence, settings, method, rows))
-    return rows.groupby(["start", "perturbation"])["worth"].mean()
+    """Mean over training seeds, by start and condition; do not write into it."""
+
+    def made() -> "pd.Series[float]":
+        rows = rollouts(evidence, settings, method)
+        rows = rows.assign(worth=utilities(evidence, settings, method, rows))
+        return rows.groupby(["start", "perturbation"])["worth"].mean()
+
+    # Every pair that a method stands in asks for it, over all conditions and in each.
+    weights = tuple(by_cost(settings.utility).items())
+    planned = (settings.perturbations, settings.planned_starts)
+    return evidence.once(("worth", method, *planned, weights, settings.longest_s), made)

@@ -33,7 +33,15 @@ def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: st
 
 
 def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tuple[str, int, str]]:
-    rows = rollouts(evidence, settings, method)
+    # Those of a baseline are asked for with every candidate.
+    key = ("starts", method, settings.perturbations, settings.planned_starts)
+    return evidence.once(key, lambda: _starts_of(evidence, settings, method))
+
+
+def _starts_of(
+    evidence: Evidence, settings: StressSettings, method: str
+) -> set[tuple[str, int, str]]:
+    rows = rollouts(evidence, settings, method)[["seed", "perturbation", "start", "start_sha256"]]
     if rows[["seed", "perturbation", "start"]].duplicated().any():
         raise MissingEvidenceError(f"{method} has two rows of one seed, condition and start")
     if rows["start_sha256"].eq("").any():

@@ -127,9 +127,9 @@ def svg(figure: Figure, label: str) -> Markup:
     width at which its smallest text has `LEAST_TEXT_PX`.
     """
     sink = io.StringIO()
-    FigureCanvasSVG(figure)
     nothing = {"Creator": None, "Date": None, "Format": None, "Type": None}
-    figure.savefig(sink, format="svg", metadata=nothing)
+    # As `savefig`, which draws all of it twice: once without a line, for the layout alone.
+    FigureCanvasSVG(figure).print_svg(sink, metadata=nothing)  # type: ignore[no-untyped-call]
     text = sink.getvalue()
     text = text[text.index("<svg") :]
     head, body = text.split(">", 1)
