@@ -1,7 +1,7 @@
 """The evidence on the desk: one figure and one table a gate; the rest stands on its page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from textwrap import shorten
@@ -32,7 +32,7 @@ UNBROKEN = "\u00a0"
 UNREADABLE = "no report that can be read"
 MOST = 200
 """Characters of a reason; the gate's page has all of it."""
-KEPT = 8
+KEPT = 16
 """The desk is printed again by every gate; the same evidence is drawn once in a process."""
 
 
@@ -85,15 +85,31 @@ def _exhibit(
             require_bound(evidence, report, path)
     except (MissingEvidenceError, GenpolicyError) as error:
         return Exhibit(gate, NAMES[gate], missing=shorten(str(error), MOST, placeholder=" …"))
-    figure, table = _drawn(evidence.root, gate, report_bytes(report))
+    figure, table = _drawn(_Judged(gate, report_bytes(report), evidence.root))
     own = tuple(file for file in rows[gate].files if file.path in sources)
     return Exhibit(gate, NAMES[gate], figure, table, own)
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """Evidence as a report names it, by hash; it is the same wherever it lies.
+
+    Attributes:
+        gate: Letter.
+        report: Bytes of the report.
+        root: Below which its evidence lies, and was found to be what the report names.
+    """
+
+    gate: Gate
+    report: bytes
+    root: Path = field(compare=False)
+
+
 @lru_cache(maxsize=KEPT)
-def _drawn(root: Path, gate: Gate, report: bytes) -> tuple[Shown, ...]:
+def _drawn(judged: _Judged) -> tuple[Shown, ...]:
     """Figure and table of the evidence that a report names."""
-    return tuple(draw_all(SHOWN[gate], Evidence(root), parse_report(report, gate=gate)))
+    report = parse_report(judged.report, gate=judged.gate)
+    return tuple(draw_all(SHOWN[judged.gate], Evidence(judged.root), report))
 
 
 def _signatures(signing: Signing) -> Exhibit:

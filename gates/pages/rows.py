@@ -23,15 +23,16 @@ from gates.pages.rows_files import RowsFile, lines_of, sampled, whole_or_counted
 from gates.pages.rows_signed import signature_rows
 from gates.report import Answer, GateReport, report_path
 from gates.stress.rollouts import ROLLOUTS, STRESS
-from genpolicy.errors import GenpolicyError
+from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_bytes_of, sha256_file
 from genpolicy.integrity.tables import table_of
 
 UNPLAIN = re.compile(r"[^A-Za-z0-9_-]")
 DOCUMENT = pa.schema([("place", pa.string()), ("value", pa.string())])
-KEPT_TABLES = 48
-"""Every page is printed several times in a process; the same bytes are written out once."""
+KEPT_TABLES = 256
+"""Every page is printed several times in a process; the same bytes are written out once. More than
+the tables of all gates, or each is dropped before the next page asks for it."""
 CRITERIA = "criteria.csv"
 ARTIFACTS = "artifacts/"
 COMPARED = (ROLLOUTS,)
@@ -117,8 +118,8 @@ def rows_of(root: Path, report: GateReport) -> Rows:
             compares = None in whose or path in COMPARED
             only = frozenset[str]() if compares else frozenset(filter(None, whose))
             wanted = _Wanted(path, report.materials.get(path, ""), played, only,
-                             tuple(counted.get(path, ())))  # fmt: skip
-            files = _files(root / path, wanted)
+                             tuple(counted.get(path, ())), root / path)  # fmt: skip
+            files = _files(wanted)
             if isinstance(files, str):
                 lacking[path] = files
             else:
@@ -176,6 +177,7 @@ class _Wanted:
         played: Journals that are evidence.
         only: Whose rows; of all methods if empty.
         counted: Columns by which criteria count its rows.
+        file: Where it lies; the same bytes elsewhere have the same rows.
     """
 
     path: str
@@ -183,27 +185,38 @@ class _Wanted:
     played: frozenset[str]
     only: frozenset[str]
     counted: tuple[str, ...]
+    file: Path = field(compare=False)
 
 
-def _files(file: Path, wanted: _Wanted) -> tuple[RowsFile, ...] | str:
+def _files(wanted: _Wanted) -> tuple[RowsFile, ...] | str:
     """Files of what lies there, of these methods or of all; or why there are none."""
-    if not file.is_file():
+    if not wanted.file.is_file():
         return MISSING
     try:
-        if sha256_file(file) != wanted.judged:
+        if sha256_file(wanted.file) != wanted.judged:
             return ALTERED
-        return _split(file, wanted) or OTHERS
+        return _split(wanted) or OTHERS
     except GenpolicyError:
         return UNREADABLE
 
 
 @lru_cache(maxsize=KEPT_TABLES)
-def _split(file: Path, wanted: _Wanted) -> tuple[RowsFile, ...]:
-    """Files of one table or document, of the bytes that were judged."""
+def _split(wanted: _Wanted) -> tuple[RowsFile, ...]:
+    """Files of one table or document, of the bytes that were judged.
+
+    Raises:
+        IntegrityError: It has other bytes since it was hashed, or is no whole table.
+        BadInputError: Not strict JSON.
+    """
     path, only = wanted.path, wanted.only
-    digest, data = sha256_bytes_of(file, keep=True)
+    digest, data = sha256_bytes_of(wanted.file, keep=True)
     if digest != wanted.judged:
-        return ()
+        raise IntegrityError(
+            where=path,
+            found="changed while it was read",
+            expected="the bytes that were judged",
+            action="Print the page again when nobody writes.",
+        )
     base = str(PurePosixPath(path.removeprefix(ARTIFACTS)).with_suffix("")).replace("/", ".")
     if path.endswith(".json"):
         places = [*_places(parse_json(data, where=path))]

@@ -8,6 +8,7 @@ from gates.evidence import Evidence
 from gates.pages import desk_gates as module
 from gates.pages.desk_card import Signing
 from gates.pages.desk_gates import SHOWN, exhibits_of
+from gates.pages.figures import draw_all
 from gates.pages.rows import rows_of
 from gates.report import GATES
 from gates.writing import write_gate
@@ -40,6 +41,21 @@ def test_every_gate_with_evidence_has_one_figure_and_one_table_with_their_rows(e
         assert {file.path for file in item.rows} == sources - {
             "artifacts/audit/summary.json" if gate != "A" else ""
         }
+
+
+@pytest.mark.parametrize("gate", SHOWN)
+def test_an_exhibit_is_made_of_what_it_names_and_is_the_same_wherever_that_lies(
+    whole, judged, copied, monkeypatch, gate
+):
+    """It is kept by its report alone, which names the bytes of all that it is made of."""
+    evidence_of = Evidence(whole)
+    with evidence_of.recorded() as read:
+        draw_all(SHOWN[gate], evidence_of, judged(gate))
+    named = {path for item in SHOWN[gate] for path in (item.source, *item.also)}
+    assert {*read, *evidence_of.materials} == named
+    kept = shown({gate: judged(gate)}, whole)
+    monkeypatch.setattr(module, "draw_all", lambda *asked: pytest.fail("drawn again"))
+    assert shown({gate: judged(gate)}, copied) == kept
 
 
 def test_success_is_counted_in_each_condition(exhibits, whole):

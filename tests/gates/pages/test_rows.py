@@ -164,6 +164,16 @@ def test_of_a_sampled_table_all_rows_are_counted_equal_ones_in_one_line(rows, ju
     assert file.title == "counts of invocations of flow"
 
 
+def test_rows_of_all_gates_are_written_out_once(whole, judged, copied):
+    """The first page asks for those of every gate, one after the other, and is printed again."""
+    module._split.cache_clear()
+    first = [rows_of(whole, judged(gate)) for gate in "ABCD"]
+    known = module._split.cache_info()
+    assert known.currsize == known.misses  # none was dropped
+    assert [rows_of(copied, judged(gate)) for gate in "ABCD"] == first
+    assert module._split.cache_info().misses == known.misses
+
+
 def test_counts_that_do_not_fit_are_left_out_and_not_sampled(whole, judged, monkeypatch):
     rows = rows_of(whole, judged("D"))
     assert any(file.folded for file in rows.files)
