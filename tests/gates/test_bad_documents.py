@@ -48,7 +48,8 @@ def edited(whole):
 
         def changed(document):
             # JSON writes 1e-05, which YAML reads as a text.
-            written = yaml.safe_dump(document).encode() if path.suffix == ".yaml" else None
+            as_yaml = path.suffix == ".yaml"
+            written = yaml.dump(document, Dumper=yaml.CSafeDumper).encode() if as_yaml else None
             path.write_bytes(written or canonical_json(document))
             read()
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from editing import cells
 
+from gates.engine import _answer, promoted_below
 from gates.engine import judge as judge_spec
-from gates.engine import promoted_below
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY
 from gates.proof import SPECS, judge
@@ -404,9 +404,26 @@ def _found(report, name):
     return [c for c in report.criteria if c.id == name]
 
 
+def _answers(root, gate, name):
+    """The answers to one criterion as the judge of a gate has them, the others not asked."""
+    params, spec = read_params(root), SPECS[gate]
+    settings = read_settings(params, f"gate_{gate.lower()}", spec.settings)
+    limits = read_limits(params, gate, spec.criteria)
+    (item,) = (one for one in spec.criteria if one.id == name)
+    names = [None]
+    if item.per_candidate:
+        names, _ = promoted_below(root, spec.below, settings.candidates)
+    asked = [one for one in names if not settings.excepted(name, one)]
+    of, inputs, limit = Evidence(root), settings.under(limits), limits.of.get(name)
+    return [_answer(item, of, inputs, limit, one) for one in asked]
+
+
 @pytest.mark.parametrize("gate", "ABCD")
 def test_good_evidence_passes_and_names_every_limit(gate, ladder):
     report = judge(ladder, gate)
+    for name in {c.id for c in report.criteria}:
+        answers = _answers(ladder, gate, name)
+        assert [c.model_dump() for c in answers] == [c.model_dump() for c in _found(report, name)]
     assert report.verdict == "PASS", report.diagnosis
     assert {c.id for c in report.criteria} == evidence.limited(f"gate_{gate.lower()}")
     assert all(c.evidence and set(c.evidence) <= set(report.materials) for c in report.criteria)
@@ -422,14 +439,13 @@ def test_every_criterion_has_a_mutation():
 @pytest.mark.parametrize(("gate", "name"), CASES)
 def test_worse_evidence_is_red_and_measured_moves_one_way(gate, name, _ladder, tmp_path):
     """P19: growing severity never improves the number, and the worst is never PASS."""
-    values = []
-    for severity in (0.2, 1.0):
-        copy = tmp_path / f"s{severity}"
+    places = {severity: tmp_path / f"s{severity}" for severity in (0.2, 1.0)}
+    for severity, copy in places.items():
         shutil.copytree(_ladder, copy)
         WORSE[gate][name](copy, severity)
-        report = judge(copy, gate)
-        found = _found(report, name)
-        values.append([c.measured for c in found])
+    report = judge(places[1.0], gate)
+    found = _found(report, name)
+    values = [[c.measured for c in of] for of in (_answers(places[0.2], gate, name), found)]
     assert all(c.verdict != "PASS" for c in found), name
     assert report.verdict != "PASS"
     assert report.diagnosis

@@ -8,6 +8,7 @@ import shutil
 import evidence
 import pytest
 
+from gates.pages import desk_gates, rows
 from gates.pages.numbers import judged_at
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
@@ -91,10 +92,17 @@ def test_what_holds_is_folded_and_what_does_not_stands_open(pages, tmp_path):
 
 @pytest.mark.parametrize("gate", "AD")
 def test_same_evidence_same_bytes(pages, gate):
+    rows._split.cache_clear()
     report = judge(pages, gate)
     assert report_bytes(report) == (pages / report_path(gate)).read_bytes()
     assert gate_page(pages, report) == _page(pages, gate)
     assert markdown(report) == (pages / f"reports/gate_{gate.lower()}.md").read_text()
+
+
+def test_same_reports_same_front_page_drawn_again(pages):
+    desk_gates._drawn.cache_clear()
+    rows._split.cache_clear()
+    assert index_page(pages) == (pages / "reports/index.html").read_text()
 
 
 def test_the_first_page_that_is_another_one_is_named(pages, tmp_path):
