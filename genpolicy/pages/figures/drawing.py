@@ -129,7 +129,7 @@ def svg(figure: Figure, label: str) -> Markup:
     sink = io.StringIO()
     nothing = {"Creator": None, "Date": None, "Format": None, "Type": None}
     # As `savefig`, which draws all of it twice: once without a line, for the layout alone.
-    FigureCanvasSVG(figure).print_svg(sink, metadata=nothing)
+    FigureCanvasSVG(figure).print_svg(sink, metadata=nothing)  # type: ignore[no-untyped-call]
     text = sink.getvalue()
     text = text[text.index("<svg") :]
     head, body = text.split(">", 1)
