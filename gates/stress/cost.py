@@ -191,12 +191,12 @@ def _share_of(  # noqa: PLR0917
         if np.any(all_of <= 0) or np.any(hits > all_of) or np.any(hits < 0):
             raise MissingEvidenceError(f"{part} is no part of {whole}")
         starts, member = np.unique(rows["start"].to_numpy(), return_inverse=True)
-        hits_of, all_of_start = np.zeros(len(starts)), np.zeros(len(starts))
-        np.add.at(hits_of, member, hits)
-        np.add.at(all_of_start, member, all_of)
+        parts, wholes = np.zeros(len(starts)), np.zeros(len(starts))
+        np.add.at(parts, member, hits)
+        np.add.at(wholes, member, all_of)
         ends = ratio_interval(
-            hits_of,
-            all_of_start,
+            parts,
+            wholes,
             confidence=settings.confidence,
             rng=settings.draws("D", part, candidate, condition),
         )
