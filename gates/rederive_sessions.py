@@ -5,11 +5,13 @@ report, and that it began where the plan begins, is asked here.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gates.rederive_brought import brought_policy
 from gates.rederive_distilled import identity
@@ -27,9 +29,12 @@ from genpolicy.verification.begun import Begun, Maker, begun_sessions
 from genpolicy.verification.joined import LABEL
 from genpolicy.verification.journal_source import readable
 
+Array = NDArray[np.float64]
 REPLACING = JoiningSettings()
 TOLERANCE = 1e-6
 """Of a pose, m or without unit: another processor rounds, another start is centimetres away."""
+ARM_RAD = 1e-4
+"""Of a joint at the start: journals have six decimals, and where the arm stands was solved for."""
 
 
 def rederive_sessions(
@@ -115,28 +120,49 @@ def _joined(gate: Gate, place: str, session: Begun, joining: JoiningSettings) ->
         refuse(gate, f"{place}: its chunks join by", said, f"{planned}, as planned")
 
 
-def _planned(params: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The scene of every planned start, as it is first seen."""
+@dataclass(frozen=True)
+class _Start:
+    """A planned start as it is first seen: poses of the scene by body, and joints, rad."""
+
+    scene: Mapping[str, Array]
+    q_rad: Array
+
+
+def _planned(params: Mapping[str, Any]) -> list[_Start]:
+    """Every planned start, as it is first seen."""
     task = load_task(section(params, "task", TaskSection).name)
     count = section(params, "stress", StressSettings).starts
     settings = WorldSettings(calibration_epoch=task.calibration_epochs[-1])
     found = []
     for start in matched_starts(task, root_seed=root_seed(params), count=count):
-        seen = task.scene_poses(task.make_world(start, settings=settings).observe())
-        found.append({body: np.concatenate(pose) for body, pose in seen.items()})
+        world = task.make_world(start, settings=settings)
+        seen = task.scene_poses(world.observe())
+        scene = {body: np.concatenate(pose) for body, pose in seen.items()}
+        found.append(_Start(scene, np.array(world.q_meas)))
     return found
 
 
-def _began(gate: Gate, place: str, session: Begun, planned: Sequence[Mapping[str, Any]]) -> None:
+def _began(gate: Gate, place: str, session: Begun, planned: Sequence[_Start]) -> None:
     number = int(session.labels["start"])
     seen = session.bodies or {}
     if not 0 <= number < len(planned):
         refuse(gate, f"{place}: start", str(number), f"one of the {len(planned)} that are planned")
-    expected = planned[number]
+    expected, q_rad = planned[number].scene, session.q_rad
     if set(seen) != set(expected) or not all(
         np.allclose(seen[body], expected[body], rtol=0.0, atol=TOLERANCE) for body in expected
     ):
         refuse(gate, f"{place}: first seen", _said(seen), f"{_said(expected)}, as planned")
+    arm = planned[number].q_rad
+    if (
+        q_rad is None
+        or q_rad.shape != arm.shape
+        or not np.allclose(q_rad, arm, rtol=0.0, atol=ARM_RAD)
+    ):
+        refuse(gate, f"{place}: first measured", _joints(q_rad), f"{_joints(arm)}, as planned")
+
+
+def _joints(q_rad: Array | None) -> str:
+    return "nothing" if q_rad is None else f"joints at {np.round(q_rad, 4).tolist()} rad"
 
 
 def _said(bodies: Mapping[str, Any]) -> str:

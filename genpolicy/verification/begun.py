@@ -20,11 +20,13 @@ class Begun:
         labels: What it says of itself, by name.
         makers: Every maker that was in force, in order.
         bodies: The scene as it was first seen: x, y, z, m, and w, x, y, z by body.
+        q_rad: Joints as they were first measured; None where nobody did. Shape (J,).
     """
 
     labels: dict[str, str]
     makers: list[Maker] = field(default_factory=list)
     bodies: dict[str, NDArray[np.float64]] | None = None
+    q_rad: NDArray[np.float64] | None = None
 
 
 def begun_sessions(path: Path) -> dict[str, Begun]:
@@ -46,4 +48,6 @@ def begun_sessions(path: Path) -> dict[str, Begun]:
             session.makers.append((str(message["checkpoint"]), str(message["sampler"])))
         elif kind == "scene" and session.bodies is None:
             session.bodies = {body: floats(text) for body, text in message["bodies"].items()}
+        elif kind == "state" and session.q_rad is None:
+            session.q_rad = np.asarray(message["q_rad"], dtype=np.float64)
     return found

@@ -8,6 +8,7 @@ from makers import maker, write_policy
 
 from gates.rederive_sessions import checkpoint_of, rederive_sessions
 from genpolicy.errors import BadInputError, RefusedError
+from genpolicy.evidence.stress.measured import Measured, rounded
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings, load_task
@@ -16,20 +17,27 @@ PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
 OTHER = "f" * 64
 
 
-def _scene(start):
+def _world(start):
     task = load_task("tabletop_insertion")
     state = task.sample_start(stream(PARAMS["seed"], "starts", start))
-    world = task.make_world(state, settings=WorldSettings(task.calibration_epochs[-1]))
-    return task.scene_poses(world.observe())
+    return task.make_world(state, settings=WorldSettings(task.calibration_epochs[-1]))
 
 
-def _session(method, start, *, makers=None, scene=None):
+def _scene(start):
+    return load_task("tabletop_insertion").scene_poses(_world(start).observe())
+
+
+def _session(method, start, *, makers=None, scene=None, arm=None):
     labels = {"method": method, "perturbation": "nominal", "start": str(start)}
     journal = Journal(f"{method}/nominal/{start}", labels)
     journal.add("session", 0, {"labels": labels})
     for checkpoint, sampler in [maker(method)] if makers is None else makers:
         journal.add("active", 0, {"checkpoint": checkpoint, "sampler": sampler})
     journal.scene(0.0, _scene(start) if scene is None else scene)
+    world = _world(max(0, start))
+    Measured(load_task("tabletop_insertion"), world, journal).note(0.0)
+    if arm is not None:
+        journal.last("state")["q_rad"] = arm
     return journal
 
 
@@ -82,10 +90,21 @@ def test_another_start_under_a_planned_number_is_refused(asked):
     moved = {body: (pose[0] + 1e-5, pose[1]) for body, pose in _scene(0).items()}
     with pytest.raises(RefusedError, match="first seen"):
         asked(_session("flow", 0, scene=moved))
-    rounded = {body: (pose[0] + 1e-9, pose[1]) for body, pose in _scene(0).items()}
-    asked(_session("flow", 0, scene=rounded))
+    nearly = {body: (pose[0] + 1e-9, pose[1]) for body, pose in _scene(0).items()}
+    asked(_session("flow", 0, scene=nearly))
     with pytest.raises(RefusedError, match="first seen is nothing"):
         asked(_session("flow", 0, scene={}))
+
+
+def test_an_arm_that_began_elsewhere_in_the_planned_scene_is_refused(asked):
+    """Nearer to the hole under the hash of a start that everybody shares."""
+    arm = rounded(_world(0).q_meas)
+    asked(_session("flow", 0, arm=[arm[0] + 5e-5, *arm[1:]]))
+    with pytest.raises(RefusedError, match=r"flow/nominal/0: first measured is joints at \["):
+        asked(_session("flow", 0, arm=[arm[0] + 2e-4, *arm[1:]]))
+    for nothing in ([], arm[:-1]):
+        with pytest.raises(RefusedError, match="first measured"):
+            asked(_session("flow", 0, arm=nothing))
 
 
 @pytest.mark.parametrize("start", [-1, PARAMS["stress"]["starts"]])
