@@ -82,7 +82,7 @@ WRONGS = (
           "Nobody asks whether the way from the last command to the next row was checked.",
           "small",
           patched("genpolicy/execution/continuity.py",
-                  ("            return row == last.row + 1\n"
+                  ("            return row == last.row + 1 and holds == 0\n"
                    "        if row != about.checked_rows[0]:\n"
                    "            return False\n",
                    "            return True\n")),

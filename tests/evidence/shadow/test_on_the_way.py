@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -227,14 +228,11 @@ def test_each_can_turn_gate_c_red(shadow, demonstrated, name, wrong, monkeypatch
 def wrongs(found, incident):
     """The gate's own sum over the tables of one session."""
     account = found.account
-    place = {"method": "m", "fixture": incident.name}
-    totals = {"generated": account.generated, "executed": account.executed, "queued": 0}
-    rows = [{**totals, "reason": r, "count": n} for r, n in account.discarded.items()]
+    totals, reason = (account.generated, account.executed), str(incident.reason)
+    discarded = account.discarded or {"": 0}
+    stated = np.array([(*totals, count) for count in discarded.values()], dtype=np.float64)
+    hit = np.array([str(said) == reason for said in discarded])
     stub = {"arrivals": found.arrivals, "stale": found.stale, "invalid": found.invalid}
-    counted = _counted(
-        incident.name, str(incident.reason),
-        pd.DataFrame([{**place, **row} for row in rows or [{**totals, "reason": "", "count": 0}]]),
-        pd.DataFrame([{**place, **stub}]),
-    )  # fmt: skip
+    counted = _counted(incident.name, reason, stated, hit, pd.DataFrame([stub]))
     assert (incident.name in OF_TWO) == of_two(incident)
     return counted.wrong
