@@ -64,8 +64,8 @@ def test_each_phase_with_each_mode_counts_every_rejection_once(shown):
         name.replace("_", " ") for name in evidence.FIXTURES[2:]
     )
     told = {line[0]: line[1:] for line in corrupted[1:]}
-    assert told["collision"] == ("scene collision", "0", "joint jerk 32", "32 of 32")
-    assert {line[1:] for line in told.values()} == {("0", "joint jerk 32", "32 of 32")}
+    assert told["collision"] == ("scene collision", "8", "joint jerk 24", "32 of 32")
+    assert {line[1:] for line in told.values()} == {("8", "joint jerk 24", "32 of 32")}
 
 
 def test_without_a_rejection_it_says_so(whole, judged):
