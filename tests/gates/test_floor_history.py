@@ -20,7 +20,8 @@ def test_every_bound_of_the_module_is_read_from_its_text():
     ("old", "new", "places", "kind"),
     [
         ("OLDEST_ACTION_S = 1.0", "OLDEST_ACTION_S = 2.0",
-         {"C.execution.maximum_age_s", "D.execution.maximum_age_s", "D.latency_p95_s"}, "loosened"),
+         {"C.execution.maximum_age_s", "D.execution.maximum_age_s", "C.execution.deadline_s",
+          "D.execution.deadline_s", "D.latency_p95_s"}, "loosened"),
         ('"intervention_upper", "<=", 0.2', '"intervention_upper", "<=", 0.1',
          {"D.intervention_upper"}, "tightened"),
         ('"nominal_success_lower", ">=", 0.2', '"nominal_success_lower", ">=", 0.1',
