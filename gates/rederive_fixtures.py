@@ -6,9 +6,8 @@ against that. Another processor rounds otherwise, so numbers may lie a little ap
 of may not. Of who was brought `gates.rederive_conformance` asks.
 """
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,7 @@ Array = NDArray[np.float64]
 Row = TypeVar("Row", FixtureRow, SampleRow, VariationRow)
 
 
-def rederive_fixtures(root: Path, params: Mapping[str, Any]) -> None:
+def rederive_fixtures(bench: Bench) -> None:
     """Draw the fixtures of every trained candidate again, on the CPU, in all ways.
 
     Raises:
@@ -51,7 +50,7 @@ def rederive_fixtures(root: Path, params: Mapping[str, Any]) -> None:
         IntegrityError: A file is missing, or is not what it claims to be.
         BadInputError: A table cannot be read.
     """
-    bench = Bench.of("B", root, params)
+    root, params = bench.root, bench.params
     count = bench.number("policy", "fixtures")
     observations = fixture_observations(bench.data, horizons=bench.horizons, count=count)
     drawn = read_rows(root / DRAWN, FixtureRow)

@@ -1,9 +1,6 @@
 """Whether a latent answers the observation, tested again with the checkpoint that it is of."""
 
-from collections.abc import Mapping
 from dataclasses import fields
-from pathlib import Path
-from typing import Any
 
 from gates.need.settings import MEASURED
 from gates.rederive_measured import Bench, trained_in
@@ -22,7 +19,7 @@ same within 1e-5 and the test sees squares of that."""
 SECTION = "measure_baselines"
 
 
-def rederive_latent(root: Path, params: Mapping[str, Any]) -> None:
+def rederive_latent(bench: Bench) -> None:
     """Test the latent of every training again, as `params.yaml` plans it.
 
     Raises:
@@ -31,15 +28,15 @@ def rederive_latent(root: Path, params: Mapping[str, Any]) -> None:
         IntegrityError: A file is missing, or is not what it claims to be.
         BadInputError: A table or document cannot be read.
     """
+    params = bench.params
     planned = mapping(params.get(SECTION)).get("latent")
     stated: dict[tuple[str, str, int], LatentDependence] = {}
-    for entry in LATENT.read(root / MEASURED):
+    for entry in LATENT.read(bench.root / MEASURED):
         key = (entry.method, entry.convention, entry.seed)
         if key in stated:
             refuse("A", _of(*key), "tested twice", "one test of each training")
         stated[key] = entry
     if planned is not None:
-        bench = Bench.of("A", root, params)
         test = parse_settings(LatentTest, planned, where=f"{SECTION}.latent")
         named = mapping(mapping(params[SECTION].get("conventions")).get(test.method))
         where = f"{SECTION}.conventions.{test.method}.{test.convention}"

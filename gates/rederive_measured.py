@@ -91,7 +91,7 @@ class Bench:
         return held_out_situations(self.root / AUDIT, self.data, horizons=horizons)
 
 
-def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
+def rederive_modes(bench: Bench) -> None:
     """Measure what the policies of gates A and B reach again, at a sample of the situations.
 
     Raises:
@@ -101,15 +101,14 @@ def rederive_modes(gate: Gate, root: Path, params: Mapping[str, Any]) -> None:
         IntegrityError: A file is missing, or is not what it claims to be.
         BadInputError: A table cannot be read.
     """
-    bench = Bench.of(gate, root, params)
-    if gate == "A":
+    if bench.gate == "A":
         samples = bench.number("measure_baselines", "samples")
         path = "artifacts/measure_baselines/modes.parquet"
         _hold(bench, path, ModeRow, _baselines(bench), lambda _: samples)
         few = bench.number("measure_factors", "samples")
         path = "artifacts/measure_factors/modes.parquet"
         _hold(bench, path, FactorModeRow, _variants(bench), lambda p: candidates_of(p, few))
-    if gate == "B":
+    if bench.gate == "B":
         samples = bench.number("reload", "samples")
         path = "artifacts/reload/modes.parquet"
         _hold(bench, path, ModeRow, chain(_candidates(bench), _brought(bench)), lambda _: samples)
@@ -191,13 +190,14 @@ def _brought(bench: Bench) -> Iterator[tuple[Group, Policy | None]]:
     for name in mapping(bench.params.get("candidates")):
         own = brought_policy(bench.root, bench.params, str(name))
         assert own is not None  # it is one of the section
+        declared = own.entry.declared
+        group = own.name, own.seed, declared.sampler if declared else UNSAID
+        told = found[own.name].findings if own.name in found else ()
+        if any(one.judged == "fails" for one in told if one.name in REPEATS):
+            yield group, None
+            continue
         with running(own, contract, scene=scene) as policy:
-            declared = own.entry.declared
-            convention = declared.sampler if declared else UNSAID
-            group = own.name, own.seed, convention
-            told = found[own.name].findings if own.name in found else ()
-            again = not any(one.judged == "fails" for one in told if one.name in REPEATS)
-            yield group, policy if again else None
+            yield group, policy
 
 
 def trained_in(

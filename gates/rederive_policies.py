@@ -6,7 +6,7 @@ from typing import Any
 
 from gates.rederive_fixtures import rederive_fixtures
 from gates.rederive_latent import rederive_latent
-from gates.rederive_measured import rederive_modes
+from gates.rederive_measured import Bench, rederive_modes
 from gates.report import Gate
 
 
@@ -19,8 +19,9 @@ def rederive_policies(gate: Gate, root: Path, params: Mapping[str, Any]) -> None
         IntegrityError: A file is missing, or is not what it claims to be.
         BadInputError: A table cannot be read.
     """
-    rederive_modes(gate, root, params)
+    bench = Bench.of(gate, root, params)
+    rederive_modes(bench)
     if gate == "A":
-        rederive_latent(root, params)
+        rederive_latent(bench)
     if gate == "B":
-        rederive_fixtures(root, params)
+        rederive_fixtures(bench)

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from gates.rederive_fixtures import ROUNDED, rederive_fixtures
+from gates.rederive_measured import Bench
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.errors import RefusedError
 from genpolicy.evidence.reproducibility.variations import of_threads
@@ -49,7 +50,7 @@ def holds(tmp_path, fleet, dataset, kit, true):
         write_rows(artifacts / "train_generators/fixtures.parquet", FixtureRow, drawn)
         write_rows(artifacts / "reload/samples.parquet", SampleRow, samples)
         write_rows(artifacts / "reload/variations.parquet", VariationRow, varied)
-        rederive_fixtures(tmp_path, params)
+        rederive_fixtures(Bench.of("B", tmp_path, params))
 
     return holds
 

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import pytest
 
 from gates.rederive_latent import rederive_latent
+from gates.rederive_measured import Bench
 from genpolicy.candidates.judged import sampling_by
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import RefusedError
@@ -56,7 +57,7 @@ def holds(tmp_path, fleet, dataset, audit, kit):
     def holds(*entries, latent=test):
         LATENT.write(artifacts / "measure_baselines", list(entries))
         params["measure_baselines"]["latent"] = latent
-        rederive_latent(tmp_path, params)
+        rederive_latent(Bench.of("A", tmp_path, params))
 
     return holds
 

@@ -55,26 +55,26 @@ def rewrite(root, **changes):
 
 
 def test_true_rows_are_found_again(measured, params):
-    rederive_modes("B", measured, params)
+    rederive_modes(Bench.of("B", measured, params))
 
 
 def test_a_count_that_it_does_not_give_is_refused(measured, params):
     rewrite(measured, admissible=SAMPLES, valid=SAMPLES, far_from_modes=0, between_modes=0)
     with pytest.raises(RefusedError, match=r"planted \(seed 0\)"):
-        rederive_modes("B", measured, params)
+        rederive_modes(Bench.of("B", measured, params))
 
 
 def test_of_who_answers_otherwise_each_time_the_rows_are_asked_for_and_no_more(measured, params):
     judged(measured, "repeats", "fails")
     rewrite(measured, admissible=SAMPLES, valid=SAMPLES)
-    rederive_modes("B", measured, params)
+    rederive_modes(Bench.of("B", measured, params))
     write_rows(measured / MODES, ModeRow, [])
     with pytest.raises(RefusedError, match="no row"):
-        rederive_modes("B", measured, params)
+        rederive_modes(Bench.of("B", measured, params))
 
 
 def test_without_a_document_of_its_answers_it_is_asked_all_the_same(measured, params):
     CONFORMANCE.write(measured / "artifacts/reload", {})
     rewrite(measured, samples=SAMPLES + 1)
     with pytest.raises(RefusedError, match="samples is 4"):
-        rederive_modes("B", measured, params)
+        rederive_modes(Bench.of("B", measured, params))
