@@ -8,7 +8,13 @@ import shutil
 from pathlib import Path
 from typing import NoReturn
 
-from genpolicy.data.formats.detect import DATASET, LAYOUT_OF, check_named, detect, refuse_unreadable
+from genpolicy.data.formats.detect import (
+    DATASET,
+    check_named,
+    detect,
+    named_layout,
+    refuse_unreadable,
+)
 from genpolicy.data.formats.ends import check_ends
 from genpolicy.errors import BadInputError, ConfigError
 
@@ -215,7 +221,7 @@ def _size(path: Path, most: int) -> int:
     total = 0
     for here, _, files in os.walk(path):
         for name in files:
-            if Path(name).suffix in LAYOUT_OF:
+            if named_layout(name) is not None:
                 total += (Path(here) / name).lstat().st_size
             if total >= most:
                 return most

@@ -101,6 +101,11 @@ def only_hdf5(path: Path) -> Path:
     return path / names[0] if len(names) == 1 else path
 
 
+def named_layout(name: str) -> str | None:
+    """The layout of recordings that the end of a file's name says; None of another file."""
+    return LAYOUT_OF.get(Path(name).suffix.lower())
+
+
 def contents(path: Path, *, into_whole: bool = False) -> Contents:
     """What lies in a folder and below it; no file is opened, no link is followed.
 
@@ -125,7 +130,7 @@ def contents(path: Path, *, into_whole: bool = False) -> Contents:
                 break
             continue
         for name in sorted(files):
-            layout = LAYOUT_OF.get(Path(name).suffix.lower())
+            layout = named_layout(name)
             if layout is None:
                 found.others[Path(name).suffix or "no suffix"] += 1
             else:
@@ -240,7 +245,7 @@ def _file(path: Path) -> str:
         _refuse(path, "a device or a pipe", "a regular file, or a folder")
     with path.open("rb") as stream:
         head = stream.read(8)
-    named = LAYOUT_OF.get(path.suffix.lower())
+    named = named_layout(path.name)
     if head == HDF5_MAGIC or named == "robomimic":
         return "robomimic"
     if head[:4] == PARQUET_MAGIC or named == "parquet":
