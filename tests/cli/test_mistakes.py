@@ -232,7 +232,7 @@ def test_an_old_output_that_may_not_be_replaced(command, mark, place, capsys, mo
 @pytest.mark.parametrize("name", ["a.parquet", "a.PARQUET", "a.pq"])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_room(command, name, place, capsys, monkeypatch):
-    lay(place / "recordings", name)
+    lay(place / "recordings", name, data=PARQUET)
     free = len(PARQUET) - 1
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(1, 1, free))
     assert "MiB free" in refused(command, "recordings", "out", capsys)
