@@ -104,6 +104,8 @@ class WorldView:
             self._begun_in[m["id"]] = self.scene
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
+        elif kind == "outcome" and not self.stopped:
+            yield from self._unheard()
 
     def scenes_of(self, chunk_id: str) -> tuple[dict[str, str] | None, ...]:
         """In which of the scenes on record a chunk may have been checked.
@@ -147,13 +149,17 @@ class WorldView:
             yield "P1.controller", f"The controller is in mode {self.controller!r}."
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
-        if not self._felt_n <= self._most_n + ROUNDING_N:
-            yield "P7.force", f"{self._felt_n} N are measured, the phase bears {self._most_n} N."
+        yield from self._unheard()
         # A chunk that does not say what it was checked in is a violation of its own (P6.ground).
         shift_m = moved_m(chunk["motion"]["scene"], self.scene) if chunk["motion"] else 0.0
         if not shift_m <= settings["maximum_scene_shift_m"]:
             yield "P1.scene", f"A body has moved by {shift_m:.3g} m since the chunk was checked."
         yield from self._voided(seen_ns, chunk["arrival"])
+
+    def _unheard(self) -> Iterator[Finding]:
+        """A force beyond what the phase bears, of which nobody heard: it goes on, or ends well."""
+        if not self._felt_n <= self._most_n + ROUNDING_N:
+            yield "P7.force", f"{self._felt_n} N are measured, the phase bears {self._most_n} N."
 
     def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:
         for cause, before_ns in self.void_before.items():

@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.selector import tries_another
-from genpolicy.contract.chunk import (
-    Candidate,
-    DiscardReason,
-    Proposal,
-)
+from genpolicy.contract.chunk import Candidate, DiscardReason, Proposal
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import (
     COMMANDS_AT_THE_BOUNDARY,
@@ -221,10 +217,12 @@ class Rollout:
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
         self.recovery.feel(self.now_s, self.world.contact_force_n)
         if self.world.success:
-            self._end(Outcome.ASSISTED if self.person.calls else Outcome.SUCCESS)
+            self.end(Outcome.ASSISTED if self.person.calls else Outcome.SUCCESS)
 
     def end(self, outcome: Outcome) -> None:
-        """End from outside: the time is over."""
+        """End a rollout that has not ended, unless its last period brought a stop instead."""
+        if not self.done:
+            self._supervise(self.now_s)
         if not self.done:
             self._end(outcome)
 
