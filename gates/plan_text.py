@@ -2,7 +2,8 @@
 
 import textwrap
 
-from gates.planning import MOST_STARTS, Gain, Plan
+from gates.planned_power import MOST_STARTS, Gain, Stated
+from gates.planning import Plan
 
 COLUMNS = 80
 WHATEVER = "Gate D would be INCONCLUSIVE whatever the rollouts show"
@@ -78,6 +79,17 @@ def _stated_text(plan: Plan) -> list[str]:
         f"{stated.baseline_success:.0%} (stress.planned_effect)",
         f"  found in {stated.promote_share:.0%} of trials with {plan.starts} starts; in "
         f"{plan.power:.0%} {needed}",
+        *_crowded_text(stated),
+    ]
+
+
+def _crowded_text(stated: Stated) -> list[str]:
+    """What the power is where the best baseline is not alone."""
+    if stated.baselines < 2:
+        return []
+    return [
+        f"  in {stated.crowded_share:.0%} if all {stated.baselines} simple methods are worth "
+        f"{stated.baseline_success:.0%}"
     ]
 
 

@@ -6,29 +6,30 @@ show, and a gain that is too small to be found leaves it with the simpler policy
 """
 
 import dataclasses
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.stats import binom
+
 from gates.bounds import counted_interval, draws_for_quantile
 from gates.evidence import MissingEvidenceError
+from gates.planned_power import Gain, Stated, smallest_gains, stated_effect
 from gates.report import stage_of
 from gates.settings import Limits, read_limits, read_params, read_settings
 from gates.stated import section
 from gates.stress.gate import GATE
-from gates.stress.rollouts import StressSettings
+from gates.stress.rollouts import NOMINAL, StressSettings
 from gates.stress.trial import reachable
-from gates.stress.weights import by_cost, listed
+from gates.stress.weights import listed
 from gates.verdicts import judge_criterion, rounded
 from genpolicy.evidence.documents.stress import Power
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
-from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
-from genpolicy.seeds import stream
-from genpolicy.statistics.eprocess import Array, paired_e_value, power_table, simulate_pairs
+from genpolicy.evidence.stress.tables import power_document
 
 FEWER = ("intervention_upper", "reset_upper")
 """Criteria of which a rollout is hit or not, and hits are bad: bounded from above."""
@@ -40,11 +41,11 @@ QUANTILE = 0.95
 REACHABLE = "verdict_reachable"
 POWER = 0.8
 """Power of the smallest gain, where `verdict_reachable` has no limit of its own."""
-BASELINES = (0.1, 0.3, 0.5, 0.7, 0.9)
-STEPS = 100
-"""Gains are looked for in points of a hundred."""
-MOST_STARTS = 1000
-"""So many starts are tried for the stated effect, and no more."""
+SHARES = 1000
+"""True shares are looked for in tenths of a percent."""
+TRUE_SHARE_POWER = 0.8
+"""In so many trials a policy keeps a limit in every condition, each by itself, by the share that
+is told of it."""
 
 
 @dataclass(frozen=True)
@@ -62,43 +63,6 @@ class Bound:
     decidable: bool | None
     says: str
     fails: bool = False
-
-
-@dataclass(frozen=True)
-class Gain:
-    """The smallest gain that the paired test finds often enough.
-
-    Attributes:
-        baseline_success: Assumed success of the best baseline.
-        candidate_success: Success from which a candidate is promoted; None: not even one that
-            always succeeds.
-        promote_share: How often, of the simulated trials.
-    """
-
-    baseline_success: float
-    candidate_success: float | None
-    promote_share: float
-
-
-@dataclass(frozen=True)
-class Stated:
-    """The effect for which the trial is planned, and whether it is found.
-
-    Attributes:
-        baseline_success: What the best baseline is worth, as `stress.planned_effect` says.
-        candidate_success: What a candidate is that is worth promoting.
-        promote_share: How often such a candidate is promoted, of the simulated trials.
-        starts_needed: Starts from which it is promoted as often as is asked; None: not with as
-            many as are tried.
-        dearest_share: How often it is promoted if these are shares of successes, each of which
-            costs all that weights take; None where nothing is weighed.
-    """
-
-    baseline_success: float
-    candidate_success: float
-    promote_share: float
-    starts_needed: int | None
-    dearest_share: float | None
 
 
 @dataclass(frozen=True)
@@ -197,9 +161,9 @@ def plan_of(root: Path) -> Plan:
         margin=settings.margin,
         alpha=settings.alpha,
         power=power,
-        stated=_stated(settings, table, power),
+        stated=stated_effect(settings, table, power),
         bounds=tuple(_bounds(settings, limits, table)),
-        gains=tuple(_gains(settings, power)),
+        gains=tuple(smallest_gains(settings, power)),
     )
 
 
@@ -212,7 +176,8 @@ def _bounds(settings: StressSettings, limits: Limits, table: Power) -> Iterator[
         entry = limits.of.get(item.id)
         limit = entry.limit if entry else None
         if item.id in (*FEWER, *MORE, RECOVERY) and limit is not None:
-            yield _counted(item.id, limit, starts, settings.confidence)
+            bound = _counted(item.id, limit, starts, settings.confidence)
+            yield _with_a_true_share(bound, limit, settings) if bound.decidable else bound
         elif item.id in (TOUCHED, ANSWERED):
             yield _quantile(item.id, starts, settings.confidence)
         elif item.id == REACHABLE and limit is not None:
@@ -232,6 +197,29 @@ def _counted(name: str, limit: float, starts: int, confidence: float) -> Bound:
     none = f"{starts} of {starts} {what} show {ends[-1][0]:.3g} only"
     kept = f"from {fewest} {what} of {starts} on"
     return Bound(name, fewest is not None, none if fewest is None else kept)
+
+
+def _with_a_true_share(bound: Bound, limit: float, settings: StressSettings) -> Bound:
+    """What a policy must be worth to keep a limit in every condition often enough.
+
+    A few more hits by luck in one of many conditions leave the gate open, so that the limit itself
+    is no share that a policy could plan with.
+    """
+    if bound.criterion == RECOVERY:
+        return bound  # of entries, whose number nobody plans
+    fewer, starts = bound.criterion in FEWER, settings.planned_starts
+    disturbed = len([name for name in settings.perturbations if name != NOMINAL])
+    conditions = {MORE[0]: 1, MORE[1]: disturbed}.get(bound.criterion, len(settings.perturbations))
+    hits = np.arange(starts + 1)
+    ends = [counted_interval(int(n), starts, confidence=settings.confidence) for n in hits]
+    kept = [high <= limit if fewer else low >= limit for low, high in ends]
+    steps = np.arange(SHARES + 1) / SHARES
+    often = np.sum(binom.pmf(hits[kept][:, None], starts, steps), axis=0) ** conditions
+    enough = steps[often >= TRUE_SHARE_POWER]
+    worth = float(enough.max() if fewer else enough.min())
+    side = "at most" if fewer else "at least"
+    says = f"; kept in {TRUE_SHARE_POWER:.0%} of trials by a true share of {side} {worth:.1%}"
+    return replace(bound, says=bound.says + says)
 
 
 def _quantile(name: str, starts: int, confidence: float) -> Bound:
@@ -254,69 +242,3 @@ def _reachable(settings: StressSettings, table: Power, limit: float) -> Bound:
     assert found.value is not None, "a share of trials is a number"
     verdict = judge_criterion(rounded(found.value), limit, ">=")
     return Bound(REACHABLE, verdict == "PASS", found.caveat, fails=verdict == "FAIL")
-
-
-def _stated(settings: StressSettings, table: Power, power: float) -> Stated:
-    """How often the stated effect is found, and with how many starts often enough."""
-    baseline, candidate = settings.planned_effect
-    shares = {
-        (row.baseline_success, row.candidate_success): row.promote_share for row in table.rows
-    }
-    trials = simulate_pairs(
-        baseline,
-        candidate,
-        correlation=POWER_CORRELATION,
-        shape=(POWER_TRIALS, MOST_STARTS),
-        rng=stream(settings.root_seed, "plan", "starts"),
-    )
-    tests = (
-        paired_e_value(differences, margin=settings.margin, alpha=settings.alpha)
-        for differences in trials
-    )
-    needed = sorted(test.pairs_needed or MOST_STARTS + 1 for test in tests)
-    enough = needed[math.ceil(power * len(needed)) - 1]
-    return Stated(
-        baseline_success=baseline,
-        candidate_success=candidate,
-        promote_share=shares[settings.planned_effect],
-        starts_needed=enough if enough <= MOST_STARTS else None,
-        dearest_share=_dearest(trials, settings),
-    )
-
-
-def _dearest(trials: Array, settings: StressSettings) -> float | None:
-    """Power where every success, of whomever, costs all that the weights can take from it."""
-    if not settings.utility:
-        return None
-    kept = 1.0 - sum(by_cost(settings.utility).values())
-    tests = [
-        paired_e_value(kept * pairs, margin=settings.margin, alpha=settings.alpha)
-        for pairs in trials[:, : settings.planned_starts]
-    ]
-    return sum(test.decision == "promote" for test in tests) / len(tests)
-
-
-def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:
-    """For some baselines, the candidate that is just found: more success is found more often."""
-    for baseline in sorted({*BASELINES, settings.planned_effect[0]}):
-
-        def found(step: int, baseline: float = baseline) -> float:
-            (row,) = power_table(
-                [(baseline, step / STEPS)],
-                margin=settings.margin,
-                alpha=settings.alpha,
-                pairs=settings.planned_starts,
-                correlation=POWER_CORRELATION,
-                trials=POWER_TRIALS,
-                rng=stream(settings.root_seed, "plan", f"{baseline:g}"),
-            )  # the same draws at every step, so that what is found grows with it
-            return row.promote_share
-
-        below, above = -1, STEPS
-        if not found(above) >= power:
-            yield Gain(baseline, None, found(above))
-            continue
-        while above - below > 1:
-            middle = (above + below) // 2
-            below, above = (below, middle) if found(middle) >= power else (middle, above)
-        yield Gain(baseline, above / STEPS, found(above))

@@ -1,7 +1,8 @@
 """What a person reads of a plan."""
 
 from gates.plan_text import plan_text
-from gates.planning import Bound, Gain, Plan, Stated
+from gates.planned_power import Gain, Stated
+from gates.planning import Bound, Plan
 
 
 def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed=""):
@@ -10,8 +11,8 @@ def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed="
         rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed,
         searched_rollouts=searched, longest_s=63_000.0,
         measure="utility" if weighed else "success", weighed=weighed, margin=0.05, alpha=0.0125,
-        power=0.8, stated=Stated(0.5, 0.8, 0.86, needed, 0.4 if weighed else None), bounds=bounds,
-        gains=gains,
+        power=0.8, bounds=bounds, gains=gains,
+        stated=Stated(0.5, 0.8, 0.86, needed, 0.4 if weighed else None, 5, 0.57),
     )  # fmt: skip
 
 
@@ -30,6 +31,7 @@ def test_golden_what_a_person_reads_of_a_plan():
         "",
         "The stated effect: success 80% against 50% (stress.planned_effect)",
         "  found in 86% of trials with 90 starts; in 80% from about 77 starts on",
+        "  in 57% if all 5 simple methods are worth 50%",
         "",
         "What these starts can show",
         "  kept        up to 3 of 90",
@@ -78,7 +80,7 @@ def test_a_broken_test_is_a_fail_and_no_question_of_more_starts():
 def test_what_is_compared_is_said_where_it_is_not_success():
     lines = plan_text(made(weighed="duration 0.2, fallback 0.1")).splitlines()
     assert lines[4] == "The stated effect: utility 80% against 50% (stress.planned_effect)"
-    said = " ".join(lines[7:12])
+    said = " ".join(lines[8:13])
     assert said.startswith("Compared is utility: a success less duration 0.2, fallback 0.1, each")
     assert "it is found in 40%." in said
     assert "utility" not in plan_text(made())
