@@ -205,11 +205,13 @@ def _with_a_true_share(bound: Bound, limit: float, settings: StressSettings) -> 
     A few more hits by luck in one of many conditions leave the gate open, so that the limit itself
     is no share that a policy could plan with.
     """
-    if bound.criterion == RECOVERY:
-        return bound  # of entries, whose number nobody plans
     fewer, starts = bound.criterion in FEWER, settings.planned_starts
     disturbed = len([name for name in settings.perturbations if name != NOMINAL])
-    conditions = {MORE[0]: 1, MORE[1]: disturbed}.get(bound.criterion, len(settings.perturbations))
+    # Of recoveries nobody plans the number.
+    judged = {MORE[0]: 1, MORE[1]: disturbed, RECOVERY: 0}
+    conditions = judged.get(bound.criterion, len(settings.perturbations))
+    if not conditions:
+        return bound
     hits = np.arange(starts + 1)
     ends = [counted_interval(int(n), starts, confidence=settings.confidence) for n in hits]
     kept = [high <= limit if fewer else low >= limit for low, high in ends]

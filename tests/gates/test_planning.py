@@ -108,6 +108,14 @@ def test_a_policy_of_the_true_share_keeps_the_limit_in_all_conditions_often_enou
     assert 0.79 < kept[0] < 0.86 and kept[1] < 0.6
 
 
+def test_of_a_limit_that_is_held_in_no_condition_no_true_share_is_said(planned):
+    nominal = read_params(ROOT)["stress"]["perturbations"]["nominal"]
+    found = by_name(planned(perturbations={"nominal": nominal}))
+    assert found["stress_success_lower"].says == "from 37 successes of 90 on"
+    assert "true share" in found["nominal_success_lower"].says
+    assert "true share" not in found["recovery_success_lower"].says
+
+
 def test_five_simple_methods_that_are_as_good_take_more_to_beat_than_one(planned):
     """`docs/decision-accuracy.md` finds .63 at the level of two candidates; three share alpha."""
     alone = planned(baselines=["chunked_bc"]).stated
