@@ -130,12 +130,13 @@ def _answer(commanded: Array, motion: Motion, episodes: Integers, found: Frame) 
 
 def _follow_badly(motion: Motion, among: Flags, maximum_rows: int) -> Integers:
     """Episodes whose motion is explained far worse by their command than usual."""
-    everything = _displacements(motion, np.flatnonzero(among), maximum_rows, sample=False)
+    episodes = np.flatnonzero(among)
+    everything = _displacements(motion, episodes, maximum_rows, sample=False)
     if everything is None:
         return np.zeros(0, dtype=np.int64)
     x, y, group = everything.x, everything.y[len(FRACTIONS) // 2], everything.group
-    count = int(group[-1]) + 1
-    edges = np.searchsorted(group, np.arange(count + 1))
+    # The last of them may be too short to show a displacement, as any.
+    edges = np.searchsorted(group, np.arange(len(episodes) + 1))
     scale = np.sqrt(np.mean(y**2, axis=0))
     own = (x**2).sum(axis=0)
     gains = np.maximum((x * y).sum(axis=0), 0.0) / np.where(own > 0, own, np.inf)
@@ -148,7 +149,7 @@ def _follow_badly(motion: Motion, among: Flags, maximum_rows: int) -> Integers:
         return np.zeros(0, dtype=np.int64)
     centre, spread = densest_half(share[known])
     odd = known & (np.nan_to_num(share) > max(ODD_SHARE, centre + ODD_SPREADS * spread))
-    return np.asarray(np.flatnonzero(among)[odd], dtype=np.int64)
+    return np.asarray(episodes[odd], dtype=np.int64)
 
 
 def _frame(motion: Motion, episodes: Integers, settings: AuditSettings) -> Frame | None:

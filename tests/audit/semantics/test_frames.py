@@ -86,3 +86,15 @@ def test_an_arm_that_sags_or_falls_short_has_no_finding():
     gains = np.array([0.95, 0.9, 0.8])
     weak = mapped(data, np.ones(60, dtype=bool), lambda part: part * gains - [0, 0, 0.02])
     assert measure(weak, SETTINGS).findings == ()
+
+
+@pytest.mark.parametrize("places", [[-1], [0], [-2, -1]])
+def test_an_episode_too_short_for_a_displacement_says_nothing(places):
+    """Wherever it stands, the last included; who follows badly beside it is still found."""
+    data = arms(40, width=3)
+    chosen = some(data, 0.2)
+    commands, seen = parts(mapped(data, chosen, lambda part: part @ turned(60).T))
+    for place in places:
+        commands[place], seen[place] = commands[place][:6], seen[place][:6]
+    kind, where = first(rebuilt(data, commands, seen))
+    assert kind == "frame" and "episodes (ep" in where
