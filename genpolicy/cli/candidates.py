@@ -173,7 +173,7 @@ def _text(found: Conformance, data: DatasetHashes) -> str:
         f"{found.candidate}: {found.asked.candidates} chunks at each of {found.asked.moments} "
         f"recorded moments of {found.asked.episodes} episodes.",
         f"Serves {found.checkpoint or 'an unknown checkpoint'}; its answers are "
-        f"{found.answers_sha256 or 'not the same twice'}.",
+        f"{found.answers_sha256 or 'named by no hash (see repeats)'}.",
         f"Of who was trained on this dataset, `declared` says dataset: {data.manifest}",
         f"and split: {data.split}",
         "",

@@ -10,8 +10,8 @@ from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
 
 AGAIN = 16
 """Moments that are asked a second time, and after a new start."""
-GONE = "gone"
-"""Kind of what is not asked any more, after so many faults in a row."""
+UNASKED = ("gone", f"not asked any more after {GONE_AFTER} faults in a row")
+"""Kind and text of a moment that is not asked any more."""
 
 
 PINGS = 9
@@ -38,8 +38,9 @@ class Asked:
 
     @property
     def last(self) -> str:
-        """What the last fault was."""
-        return next(reversed(self.failures.values()), ("", ""))[1]
+        """What the last fault was, of a question that was asked."""
+        asked = (said for said in reversed(self.failures.values()) if said != UNASKED)
+        return next(asked, ("", ""))[1]
 
     def before(self, row: int) -> "Asked":
         """What was answered, and what went wrong, at the moments before one."""
@@ -51,7 +52,7 @@ class Asked:
     def ask(self, policy: RemotePolicy, starts: RecordedStarts, row: int, candidates: int) -> None:
         """One moment; a fault is counted, and after many in a row nobody is asked any more."""
         if self._in_a_row >= GONE_AFTER:
-            self.failures[row] = (GONE, f"not asked any more after {GONE_AFTER} faults in a row")
+            self.failures[row] = UNASKED
             return
         name: NoiseName = ("conformance", row)
         try:

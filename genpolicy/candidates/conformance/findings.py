@@ -71,6 +71,8 @@ def seeded(told: Capabilities, repeats: Finding, asked: Asked) -> Finding:
         len(one.actions) > 1 and (one.actions[1:] != one.actions[:1]).any()
         for one in asked.answers.values()
     )
+    if not asked.answers:
+        return Finding("seeded", "unknown", "B", "nothing was answered")
     if repeats.judged == "fails" or (draws and not told.seeded):
         takes = "it says that it can be seeded" if told.seeded else "it takes no name of the noise"
         return Finding("seeded", "fails", "B", f"its chunks differ from draw to draw; {takes}")

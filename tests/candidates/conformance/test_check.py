@@ -414,6 +414,26 @@ def test_an_answer_that_never_comes_is_a_fault_with_its_kind(checked, starts):
     assert "39 of 40 moments answered; late 1" in failed["answers"]
 
 
+class AnotherShape(Honest):
+    """Answers chunks of nine numbers: the commonest mistake of a first entry."""
+
+    def __call__(self, message):
+        answer = super().__call__(message)
+        return answer | {"actions": answer["actions"][..., :9]}
+
+
+def test_a_mistake_in_every_answer_is_told_by_what_it_is(checked, starts):
+    """Not by that nobody asks any more; of who never answered nothing is known."""
+    found = checked(AnotherShape(starts))
+    said = said_of(found, "answers")
+    assert said == (
+        "0 of 40 moments answered; gone 32, shape 8: chunks of 16 actions of 9 numbers; its entry "
+        "says 16 actions and names column 9"
+    )
+    assert judged(found)["seeded"] == judged(found)["repeats"] == "unknown"
+    assert said_of(found, "seeded") == "nothing was answered"
+
+
 def said_of(found, name):
     return next(finding.said for finding in found.findings if finding.name == name)
 
