@@ -142,7 +142,8 @@ def plan_of(root: Path) -> Plan:
     probed = len(settings.candidates) * section(params, "monitors", MonitorsSettings).rollouts
     looks = search_settings(params).evaluations * len(planned.perturbations)
     searched = len(settings.candidates) * looks
-    power = limits.number(REACHABLE, otherwise=POWER)
+    asked = limits.number(REACHABLE, otherwise=POWER)
+    power = asked if 0.0 < asked <= 1.0 else POWER  # a rehearsal may ask for anything
     table = power_document(
         planned, candidates=len(settings.candidates), root_seed=settings.root_seed
     )

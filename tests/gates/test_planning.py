@@ -39,8 +39,14 @@ def planned(tmp_path, monkeypatch):
     for name in ("POWER_TRIALS", "CROWDED_TRIALS"):
         monkeypatch.setattr(planned_power, name, TRIALS)
 
-    def plan(monitors=None, **changes):
+    def plan(monitors=None, power=None, **changes):
         params = read_params(ROOT)
+        if power is not None:
+            params["rehearsal"] = True
+            owners = params["gate_d"]["limits"].values()
+            next(own for own in owners if "verdict_reachable" in own)["verdict_reachable"][0] = (
+                power
+            )
         params = {**params, "stress": {**params["stress"], **changes}}
         params["monitors"] = params["monitors"] if monitors is None else monitors
         (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
@@ -107,6 +113,12 @@ def test_a_policy_of_the_true_share_keeps_the_limit_in_all_conditions_often_enou
         hits = draws.binomial(90, share, size=(20_000, conditions))
         kept.append(np.mean(np.all(hits <= number if fewer else hits >= number, axis=1)))
     assert 0.79 < kept[0] < 0.86 and kept[1] < 0.6
+
+
+@pytest.mark.parametrize("power", [-1e9, 0.0, 1.5])
+def test_a_rehearsal_may_ask_for_a_power_that_is_none(planned, power):
+    plan = planned(power=power)
+    assert plan.power == planning.POWER and plan.stated.starts_needed is not None
 
 
 def test_five_simple_methods_that_are_as_good_take_more_to_beat_than_one(planned):
