@@ -11,16 +11,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gates.card.people import ALLOW_LIST, AUTHOR, SPOTTER, AllowList, load_allow_list
-from gates.card.signing import utc_today
-from gates.floors import LONGEST_DAYS
+from gates.exceptions import require_day, require_unmatched, unmatched_written, utc_today
 from gates.overrides import CORRECT, Override, placed, read_overrides
-from gates.report import Gate, GateReport, Overridden
+from gates.report import Gate, GateReport, Overridden, stage_of
 from gates.reproducibility.settings import BROUGHT_FOLDER
 from gates.settings import read_params
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.brought import BROUGHT
-
-OVER = "Remove the entry, and the limit counts again; or have it renewed, with a reason."
 
 
 def require_written(root: Path, today: datetime.date | None = None) -> None:
@@ -34,7 +31,9 @@ def require_written(root: Path, today: datetime.date | None = None) -> None:
         ConfigError: One is malformed, over, for too long, or by somebody who may not; or
             `params.yaml` or the allow-list cannot be read.
     """
-    _require(root, read_overrides(root, read_params(root)), today)
+    params = read_params(root)
+    require_unmatched(unmatched_written(params), today or utc_today())
+    _require(root, read_overrides(root, params), today)
 
 
 def require_in_force(
@@ -50,6 +49,10 @@ def require_in_force(
     Raises:
         ConfigError: As `require_written`.
     """
+    if "B" in reports:
+        require_unmatched(
+            unmatched_written({stage_of("B"): reports["B"].settings}), today or utc_today()
+        )
     if reports:
         _require(root, reports[max(reports)].overrides, today)
 
@@ -69,21 +72,7 @@ def _require(
     allowed, authors = load_allow_list(root), _authors(root)
     brought = made_by(root)
     for entry in entries:
-        left = (datetime.date.fromisoformat(entry.expires) - day).days
-        if left > LONGEST_DAYS:
-            raise ConfigError(
-                where=placed(entry),
-                found=f"until {entry.expires}, {left} days from now",
-                expected=f"a last day at most {LONGEST_DAYS} days from {day} (UTC)",
-                action="An exception is for a while: write a nearer day, or change the limit.",
-            )
-        if left < 0:
-            raise ConfigError(
-                where=placed(entry),
-                found=f"over since {entry.expires}",
-                expected=f"a last day that is not before {day} (UTC)",
-                action=OVER,
-            )
+        require_day(placed(entry), entry.expires, day)
         if why := _unfit(entry, allowed, authors, brought):
             raise ConfigError(
                 where=f"{placed(entry)}: by",

@@ -5,12 +5,13 @@ tree, where nothing else sees an edit. What it writes changes only when they do.
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
 policy that is brought is not what its entry says, where a method or its sampler is none, where what
-may differ between methods never may, and where the machine has no such device: before anything
-trains.
+may differ between methods never may, where an exception of who was brought is over, and where the
+machine has no such device: before anything trains.
 """
 
 from pathlib import Path
 
+from gates.exceptions import require_unmatched, unmatched_written, utc_today
 from gates.may_differ import require_possible
 from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.hosts.loadable import require_loadable
@@ -40,6 +41,8 @@ def work(params: Params) -> None:
     search_settings(params.raw)  # read by a stage behind the last gate; wrong, it is told here
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
+    names = [policy.entry.name for policy in brought]
+    require_unmatched(unmatched_written(params.raw), utc_today(), brought=names)
     if brought:
         task = load_task(params.task.name)
         require_mapped(brought, task)

@@ -1,5 +1,6 @@
 """How a planted candidate gets into a workspace: the ladder's own flow behind a server script."""
 
+import datetime
 import shutil
 import sys
 from collections.abc import Mapping
@@ -10,11 +11,14 @@ from typing import Any
 import yaml
 
 from benchmarks.ladder_truth.workspace import edit_params
+from gates.exceptions import utc_today
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.hashing import sha256_file
 
 SERVER = Path(__file__).with_name("planted_server.py")
 OWN = "own"
+A_WHILE = datetime.timedelta(days=30)
+"""An exception holds for so long from the day on which it is planted."""
 FLOW = "artifacts/train_generators/flow/seed_0"
 TWIN = "flow"
 """Whose weights are served: what a ladder says of it, it says of an honest copy."""
@@ -113,7 +117,7 @@ def enter(workspace: Path, entry: Mapping[str, Any], reason: str) -> None:
     def change(params: dict[str, Any]) -> None:
         params["candidates"][name] = path.relative_to(workspace).as_posix()
         params["gate_b"]["unmatched"][name] = {
-            "owner": "model", "reason": reason, "expires": "2099-01-01",
+            "owner": "model", "reason": reason, "expires": str(utc_today() + A_WHILE),
         }  # fmt: skip
 
     edit_params(workspace, change)

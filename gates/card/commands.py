@@ -101,7 +101,7 @@ def fill(
     """
     from gates.card.card import card_bytes
     from gates.card.filling import filled, rules_of
-    from gates.card.signing import utc_today
+    from gates.exceptions import utc_today
     from genpolicy.errors import ConfigError
     from genpolicy.integrity.atomic import write_bytes
 

@@ -33,12 +33,12 @@ from gates.card.signing import (
     SignedCard,
     envelope_path,
     independence,
-    utc_today,
 )
 from gates.card.windows import require_aborts, windows_of
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.exceptions import utc_today
 from gates.overriders import first_end, require_in_force
 from gates.overrides import OVERRIDES, Exceptions, exceptions_of
 from gates.pipeline import check_record

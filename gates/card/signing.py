@@ -6,7 +6,6 @@ changes the statement, and the signatures no longer fit. This module signs only 
 key that a person hands to it; it makes and keeps none.
 """
 
-import datetime
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -271,11 +270,6 @@ def conflicting_cards(root: Path, name: str) -> list[str]:
     """Other envelopes in `cards/` beside that of `name`; retired cards lie in a subfolder."""
     own = f"{name}.dsse.json"
     return sorted(p.name for p in (root / CARDS).glob("*.dsse.json") if p.name != own)
-
-
-def utc_today() -> datetime.date:
-    """Today, UTC."""
-    return datetime.datetime.now(datetime.UTC).date()
 
 
 def _check_signable(card: TrialCard, person: Person, allowed: AllowList, where: str) -> None:

@@ -10,7 +10,7 @@ import yaml
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from gates import commands
-from gates.card.signing import utc_today
+from gates.exceptions import utc_today
 from gates.floors import LONGEST_DAYS
 from gates.overriders import first_end, require_in_force, require_written
 from gates.overrides import OVERRIDES

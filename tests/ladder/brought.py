@@ -10,6 +10,7 @@ import yaml
 
 from benchmarks.ladder_truth.bringing import FLOW, OWN, as_the_twin
 from benchmarks.ladder_truth.workspace import edit_params
+from gates.exceptions import utc_today
 from genpolicy.integrity.hashing import sha256_file
 
 NAME = "my_flow"
@@ -38,7 +39,9 @@ def bring_flow(workspace: Path) -> None:
 
     def change(params: dict[str, Any]) -> None:
         params["candidates"] |= lines["candidates"]
-        params["gate_b"]["unmatched"] |= lines["gate_b"]["unmatched"]
+        exceptions = lines["gate_b"]["unmatched"]
+        exceptions[NAME]["expires"] = str(utc_today())  # whenever this is run
+        params["gate_b"]["unmatched"] |= exceptions
 
     edit_params(workspace, change)
 

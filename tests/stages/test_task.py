@@ -5,6 +5,7 @@ import sys
 import pytest
 import yaml
 
+from gates.exceptions import utc_today
 from genpolicy.integrity.hashing import sha256_file, sha256_tree
 from tests.candidates.conftest import ENTRY
 
@@ -65,3 +66,25 @@ def test_a_program_that_this_machine_does_not_have(workspace, bring, stage):
     bring(address=None, command=["no_such_program", "{port}"])
     code, said = stage("task")
     assert code == 2 and "no_such_program" in said
+
+
+@pytest.mark.parametrize(("name", "expires", "told"), [
+    ("planted", "2020-01-01", "params.yaml: gate_b.unmatched.planted is over since 2020-01-01"),
+    ("planted", "9999-12-31", "expected a last day at most 90 days from"),
+    ("flow", str(utc_today()), "an exception of nobody who was brought, expected one of planted"),
+])  # fmt: skip
+def test_an_exception_is_read_before_anything_trains(
+    workspace, bring, edit, stage, name, expires, told
+):
+    bring()
+
+    def write(name, expires):
+        entry = {"owner": "model", "reason": "trained by its maker", "expires": expires}
+        edit(workspace, lambda params: params["gate_b"].update(unmatched={name: entry}))
+
+    write("planted", str(utc_today()))
+    code, said = stage("task")
+    assert code == 0, said
+    write(name, expires)
+    code, said = stage("task")
+    assert code == 2 and told in said, said

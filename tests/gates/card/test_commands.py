@@ -19,7 +19,7 @@ ASKED = ["30", "measured here", "sam", "hand button to drive enable", "rita", ""
 @pytest.fixture
 def run(team, capsys, monkeypatch):
     """A command on the ladder: exit code, standard output, standard error."""
-    monkeypatch.setattr("gates.card.signing.utc_today", lambda: __import__("team").TODAY)
+    monkeypatch.setattr("gates.exceptions.utc_today", lambda: __import__("team").TODAY)
 
     def run(*words, typed=None):
         if typed is not None:
