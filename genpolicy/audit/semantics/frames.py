@@ -134,8 +134,8 @@ def _follow_badly(motion: Motion, among: Flags, maximum_rows: int) -> Integers:
     if everything is None:
         return np.zeros(0, dtype=np.int64)
     x, y, group = everything.x, everything.y[len(FRACTIONS) // 2], everything.group
-    count = int(group[-1]) + 1
-    edges = np.searchsorted(group, np.arange(count + 1))
+    # Episodes that are too short have no displacements, the last one included.
+    edges = np.searchsorted(group, np.arange(np.count_nonzero(among) + 1))
     scale = np.sqrt(np.mean(y**2, axis=0))
     own = (x**2).sum(axis=0)
     gains = np.maximum((x * y).sum(axis=0), 0.0) / np.where(own > 0, own, np.inf)
