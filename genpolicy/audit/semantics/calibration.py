@@ -125,8 +125,7 @@ def offset_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -
     if motion.commanded.shape[1] == 0 or len(np.unique(motion.epoch)) < 2:
         return []
     offsets = _rest_offsets(motion)
-    travel = np.median(np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1))
-    floor = max(settings.calibration_floor_m, MOTION_SHARE * float(travel))
+    floor = offset_floor(motion, settings)
     names = np.unique(motion.epoch)
     medians = {str(name): np.median(offsets[motion.epoch == name], axis=0) for name in names}
     spread = _scatter(offsets, motion.epoch)
@@ -152,6 +151,12 @@ def offset_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -
                 )
             )
     return findings
+
+
+def offset_floor(motion: Motion, settings: AuditSettings) -> float:
+    """Offsets below it are not looked for, unit of the position."""
+    travel = np.median(np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1))
+    return max(settings.calibration_floor_m, MOTION_SHARE * float(travel))
 
 
 def start_drift(data: AuditInput) -> float:

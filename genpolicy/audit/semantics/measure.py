@@ -33,6 +33,7 @@ from genpolicy.audit.semantics.following import following
 from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.frozen import frozen_findings, stream_gap_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
+from genpolicy.audit.semantics.offsets import part_findings
 from genpolicy.audit.semantics.report import Semantics, in_order
 from genpolicy.audit.semantics.robust import episode_medians
 from genpolicy.audit.semantics.streams import stream_lags
@@ -41,6 +42,8 @@ from genpolicy.audit.settings import AuditSettings
 
 # A change of the lag over the recordings below this is no clock, steps.
 ORDER_STEPS = 1.0
+# What stands beside its command for these reasons is not asked whether it is calibrated.
+MOVED = {"frozen", "clock", "clock_drift"}
 
 
 def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
@@ -82,8 +85,11 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *copies.copy_findings(copied, data, settings),
         *calibration.release_findings(data, releases, settings),
     ]
-    if not any(finding.kind in ("unit", "frame", "swapped_columns") for finding in findings):
+    kinds = {finding.kind for finding in findings}
+    if not kinds & {"unit", "frame", "swapped_columns"}:
         findings += calibration.offset_findings(data, recorded, settings)
+        if not kinds & MOVED and not any(item.kind == "calibration" for item in findings):
+            findings += part_findings(data, recorded, follows, settings)
     wander = calibration.start_note(data)
     shared = _shared_offset(data, settings)
     return Semantics(
