@@ -32,12 +32,18 @@ from genpolicy.audit.semantics.drift import (
 from genpolicy.audit.semantics.following import following
 from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.frozen import frozen_findings, stream_gap_findings
+from genpolicy.audit.semantics.gains import part_gain_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
 from genpolicy.audit.semantics.offsets import part_findings
 from genpolicy.audit.semantics.report import Semantics, in_order
 from genpolicy.audit.semantics.robust import episode_medians
 from genpolicy.audit.semantics.streams import stream_lags
-from genpolicy.audit.semantics.units import component_findings, gain_findings, magnitude_findings
+from genpolicy.audit.semantics.units import (
+    component_findings,
+    gain_findings,
+    magnitude_findings,
+    mattering,
+)
 from genpolicy.audit.settings import AuditSettings
 
 # A change of the lag over the recordings below this is no clock, steps.
@@ -67,6 +73,9 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
         findings += component_findings(data, recorded, follows, settings)
+    if not findings:
+        sized = mattering(data, recorded) & ~recorded.directional
+        findings += part_gain_findings(data, recorded, follows, sized, settings)
     motion = aligned(motion, follows, settings.maximum_lag_rows)
     clocks, shift, found = _position(data, motion, settings)
     findings += found

@@ -99,7 +99,7 @@ def part_findings(
         size, others = abs(float(np.median(gaps[chosen]))), np.isfinite(gaps) & ~chosen
         if (worst is None or size > worst[0]) and _everywhere(beside, place, chosen, others):
             worst = size, place, chosen, others
-    if worst is None or _explained(data, motion, worst[2], worst[3]):
+    if worst is None or explained(data, motion, worst[2], worst[3]):
         return []
     size, place, chosen, _ = worst
     return [_finding(data, motion.names[beside.columns[place]], chosen, size, floor)]
@@ -153,13 +153,26 @@ def _everywhere(beside: _Beside, place: int, chosen: Flags, others: Flags) -> bo
     return bool(np.any(np.abs(apart) - LAG_ROWS * moved >= 0))
 
 
-def _explained(data: AuditInput, motion: Motion, chosen: Flags, others: Flags) -> bool:
-    """Whether the way tells which episodes are chosen, or what was carried."""
+def explained(
+    data: AuditInput, motion: Motion, chosen: Flags, others: Flags, *, paced: bool = False
+) -> bool:
+    """Whether the way tells which episodes are chosen, or what was carried.
+
+    Args:
+        data: Canonical data.
+        motion: Commanded and observed motion, as recorded.
+        chosen: Episodes of one side. Shape (E,).
+        others: Those of the other. Shape (E,).
+        paced: Whether how long they took may tell as well.
+    """
     known = np.flatnonzero(chosen | others)
     objects, own = data.episodes.object[known], chosen[known]
     # A shift of the one leaves the other where it was: ways are alike as commanded or as seen.
     ways = (_routes(values, motion.starts)[known] for values in (motion.commanded, motion.observed))
     if min(_told(_nearest(routes), own) for routes in ways) > TOLD:
+        return True
+    lasted = np.diff(motion.starts)[known].astype(np.float64)[:, None]
+    if paced and _told(_nearest(lasted), own) > TOLD:
         return True
     same = [np.flatnonzero(objects == name) for name in objects]
     alike = (group[group != k] for k, group in enumerate(same))

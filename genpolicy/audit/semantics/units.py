@@ -96,7 +96,7 @@ def component_findings(
     follows by another one in each episode. A column that is commanded to hardly anything has no
     factor, and a tremor is answered by less than slow motion.
     """
-    asked = _mattering(data, motion)
+    asked = mattering(data, motion)
     alike = np.maximum(found.positive, found.negative) >= LIKE
     with np.errstate(divide="ignore", invalid="ignore"):
         every = np.where(alike & found.slow, np.log(found.seen) - np.log(found.asked), np.nan)
@@ -113,7 +113,7 @@ def component_findings(
     return findings
 
 
-def _mattering(data: AuditInput, motion: Motion) -> Flags:
+def mattering(data: AuditInput, motion: Motion) -> Flags:
     """Columns that move, commanded or observed, beside the others. Shape (P,)."""
     columns = np.arange(data.observation.shape[1])[data.observation_position]
     scale = data.observation_scale[columns[: len(motion.names)]]
