@@ -48,7 +48,8 @@ from genpolicy.audit.settings import AuditSettings
 
 # A change of the lag over the recordings below this is no clock, steps.
 ORDER_STEPS = 1.0
-# What stands beside its command for these reasons is not asked whether it is calibrated.
+# What stands beside its command for these reasons is not asked whether it is calibrated, nor
+# whether it goes by another factor; where rows are lost, what is added up of rates does.
 MOVED = {"frozen", "clock", "clock_drift"}
 
 
@@ -73,9 +74,6 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
         findings += component_findings(data, recorded, follows, settings)
-    if not findings:
-        sized = mattering(data, recorded) & ~recorded.directional
-        findings += part_gain_findings(data, recorded, follows, sized, settings)
     motion = aligned(motion, follows, settings.maximum_lag_rows)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
@@ -95,6 +93,10 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *calibration.release_findings(data, releases, settings),
     ]
     kinds = {finding.kind for finding in findings}
+    if not kinds & {"unit", "frame", "swapped_columns", "gaps", *MOVED}:
+        sized = mattering(data, recorded) & ~recorded.directional
+        findings += part_gain_findings(data, recorded, follows, sized, settings)
+        kinds = {finding.kind for finding in findings}
     if not kinds & {"unit", "frame", "swapped_columns"}:
         findings += calibration.offset_findings(data, recorded, settings)
         if not kinds & MOVED and not any(item.kind == "calibration" for item in findings):
