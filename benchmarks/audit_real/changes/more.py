@@ -1,4 +1,4 @@
-"""Further changes: an hour that decides, rows that were lost, a frame that was turned."""
+"""Further changes: an hour that decides, lost rows, a frame that was turned or shifted."""
 
 from dataclasses import replace
 
@@ -68,6 +68,21 @@ def _turned(recording: Recording, place: Place, degrees: float) -> Recording:
     return at_places(recording, some(recording, place, 0.3), change).true(defect="frame")
 
 
+def _shifted(recording: Recording, place: Place, strength: float) -> Recording:
+    """What is observed of the commanded numbers stands beside, all along and one way."""
+    pairs = [at for at in recording.follows if at is not None]
+    way = place.rng.normal(size=len(pairs))
+    shift = strength * recording.scale * way / np.linalg.norm(way)
+
+    def change(episode: Episode) -> Episode:
+        seen = {name: values.copy() for name, values in episode.seen.items()}
+        for (name, number), size in zip(pairs, shift, strict=True):
+            seen[name][:, number] += size
+        return replace(episode, seen=seen)
+
+    return at_places(recording, some(recording, place, 0.3), change).true(defect="calibration")
+
+
 MORE = (
     Change(
         "hour decides, in every row", COLUMNS, _hour, "hidden_state(hour)",
@@ -80,5 +95,13 @@ MORE = (
     Change(
         "a frame turned in 30 %", DEFECT, _turned, DEFECT_SAID.format("frame"), (30.0, 90.0),
         "degrees", fits=lambda r: len(r.paired) in (2, 3),
+    ),
+)  # fmt: skip
+# After all others, whose strengths and draws go by their place.
+LATER = (
+    Change(
+        "a calibration offset in 30 %", DEFECT, _shifted, DEFECT_SAID.format("calibration"),
+        (0.5, 0.25, 0.1), "of the ways apart",
+        fits=lambda r: r.form == "absolute" and bool(r.paired),
     ),
 )  # fmt: skip

@@ -86,3 +86,11 @@ def test_an_arm_that_sags_or_falls_short_has_no_finding():
     gains = np.array([0.95, 0.9, 0.8])
     weak = mapped(data, np.ones(60, dtype=bool), lambda part: part * gains - [0, 0, 0.02])
     assert measure(weak, SETTINGS).findings == ()
+
+
+def test_a_last_episode_that_is_too_short_ends_no_audit():
+    """It has no displacements: what is counted by episode is counted for all of them."""
+    data = arms(39)
+    commands, seen = parts(data)
+    commands[-1], seen[-1] = commands[-1][:8], seen[-1][:8]
+    assert measure(rebuilt(data, commands, seen), SETTINGS).findings == ()
