@@ -9,7 +9,7 @@ from benchmarks.audit_real.changes.change import Change, Place
 from benchmarks.audit_real.changes.columns import COLUMN_CHANGES, DECIDED
 from benchmarks.audit_real.changes.defects import DEFECTS
 from benchmarks.audit_real.changes.forms import FORMS
-from benchmarks.audit_real.changes.more import MORE
+from benchmarks.audit_real.changes.more import LATER, MORE
 from benchmarks.audit_real.changes.said import SAID
 from benchmarks.audit_real.changes.time import TIMES
 from benchmarks.audit_real.plan import Plan
@@ -38,7 +38,7 @@ BASES: dict[str, Callable[[Plan], Recording]] = {
 }
 CHANGES: dict[str, Change] = {
     change.name: change
-    for change in (*FORMS, *DECIDED, *COLUMN_CHANGES, *TIMES, *DEFECTS, *MORE, *SAID)
+    for change in (*FORMS, *DECIDED, *COLUMN_CHANGES, *TIMES, *DEFECTS, *MORE, *SAID, *LATER)
 }
 # Two changes at once: a defect beside what decides, a form beside either, names beside all.
 CROSSINGS = (

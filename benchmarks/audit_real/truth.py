@@ -18,6 +18,7 @@ DEFECTS = {
     "duplicate": ("duplicate",),
     "frozen": ("frozen",),
     "gap": ("gap", "rate", "jitter", "clock"),
+    "calibration": ("calibration",),
 }
 UNRECORDED = ("unrecorded", "history", "sequence", "order")
 OPEN = "insufficient_support"

@@ -204,6 +204,23 @@ def test_a_fault_is_in_the_episodes_said_and_in_no_other(base, name):
         assert same is not after.faulty
 
 
+@pytest.mark.parametrize("base", ["pushing", "planner", "aloha"])
+def test_an_offset_is_one_shift_of_what_the_commands_move_in_a_part(base):
+    name = "a calibration offset in 30 %"
+    clean, faulty = small(base), small(base, name)
+    shifts = []
+    for before, after in zip(clean.episodes, faulty.episodes, strict=True):
+        assert np.array_equal(before.action, after.action)
+        moved = paired(faulty, after) - paired(clean, before)
+        assert np.ptp(moved, axis=0).max() < 1e-9
+        assert bool(np.any(moved[0])) is after.faulty
+        shifts += [moved[0]] * after.faulty
+    assert len(shifts) == round(0.3 * len(clean.episodes)) and np.ptp(shifts, axis=0).max() < 1e-9
+    far = CHANGES[name].strengths[0] * clean.scale
+    assert np.linalg.norm(shifts[0]) == pytest.approx(far)
+    assert faulty.truth.defect == "calibration" and not fits("goals", [name])
+
+
 def test_each_fault_is_what_it_is_called():
     clean = small("planner")
     pairs = {

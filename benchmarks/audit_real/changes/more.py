@@ -1,4 +1,4 @@
-"""Further changes: an hour that decides, rows that were lost, a frame that was turned."""
+"""Further changes: an hour that decides, lost rows, a frame that was turned or shifted."""
 
 from dataclasses import replace
 
@@ -11,6 +11,7 @@ from benchmarks.audit_real.changes.change import (
     Place,
     at_places,
     free,
+    published,
     some,
     steady,
 )
@@ -68,6 +69,33 @@ def _turned(recording: Recording, place: Place, degrees: float) -> Recording:
     return at_places(recording, some(recording, place, 0.3), change).true(defect="frame")
 
 
+def _shifted(recording: Recording, place: Place, strength: float) -> Recording:
+    """What is observed of the commanded numbers stands beside, all along and one way."""
+    pairs = [at for at in recording.follows if at is not None]
+    way = place.rng.normal(size=len(pairs))
+    shift = strength * recording.scale * way / np.linalg.norm(way)
+
+    def change(episode: Episode) -> Episode:
+        seen = {name: values.copy() for name, values in episode.seen.items()}
+        for (name, number), size in zip(pairs, shift, strict=True):
+            seen[name][:, number] += size
+        return replace(episode, seen=seen)
+
+    return at_places(recording, some(recording, place, 0.3), change).true(defect="calibration")
+
+
+def _another_scale(recording: Recording, place: Place, factor: float) -> Recording:
+    """A third is told more or less of the same way: from its begin, where a place is told."""
+
+    def change(episode: Episode) -> Episode:
+        action, told = episode.action.copy(), recording.paired
+        begin = action[:1, told] if recording.form == "absolute" else 0.0
+        action[:, told] = begin + factor * (action[:, told] - begin)
+        return replace(episode, action=action)
+
+    return at_places(recording, some(recording, place, 1.0 / 3.0), change).true(defect="unit")
+
+
 MORE = (
     Change(
         "hour decides, in every row", COLUMNS, _hour, "hidden_state(hour)",
@@ -80,5 +108,18 @@ MORE = (
     Change(
         "a frame turned in 30 %", DEFECT, _turned, DEFECT_SAID.format("frame"), (30.0, 90.0),
         "degrees", fits=lambda r: len(r.paired) in (2, 3),
+    ),
+)  # fmt: skip
+# After all others, whose strengths and draws go by their place.
+LATER = (
+    Change(
+        "a calibration offset in 30 %", DEFECT, _shifted, DEFECT_SAID.format("calibration"),
+        (0.5, 0.25, 0.1), "of the ways apart",
+        fits=lambda r: r.form == "absolute" and bool(r.paired),
+    ),
+    Change(
+        "a third of another scale", DEFECT, _another_scale, DEFECT_SAID.format("unit"),
+        (1.5, 2.54, 0.5), "factor of the commanded motion",
+        fits=lambda r: bool(r.paired) and not published(r),
     ),
 )  # fmt: skip

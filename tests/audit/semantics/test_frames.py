@@ -98,3 +98,11 @@ def test_an_episode_too_short_for_a_displacement_says_nothing(places):
         commands[place], seen[place] = commands[place][:6], seen[place][:6]
     kind, where = first(rebuilt(data, commands, seen))
     assert kind == "frame" and "episodes (ep" in where
+
+
+def test_a_last_episode_that_is_too_short_ends_no_audit():
+    """It has no displacements: what is counted by episode is counted for all of them."""
+    data = arms(39)
+    commands, seen = parts(data)
+    commands[-1], seen[-1] = commands[-1][:8], seen[-1][:8]
+    assert measure(rebuilt(data, commands, seen), SETTINGS).findings == ()
