@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gates.rederive_checked import rederive_checked
+from gates.rederive_outcomes import rederive_probed_outcomes
 from gates.rederive_shadow import TaskSection
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
@@ -45,7 +46,8 @@ def rederive_monitors(
 
     Raises:
         RefusedError: A threshold or an alarm is not what the scores give, a rollout not what its
-            journal says or begun elsewhere than planned, or a finding of the checker another.
+            journal says or begun elsewhere than planned, its recorded commands do not lead where it
+            says, or a finding of the checker another.
         IntegrityError: A file is missing or no regular file.
         BadInputError: A file cannot be read.
     """
@@ -74,3 +76,4 @@ def rederive_monitors(
     named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
     compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
     rederive_checked(root, "D", MONITORS, held_to, journals)
+    rederive_probed_outcomes(params, journals)

@@ -16,6 +16,7 @@ import numpy as np
 
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
 from gates.rederive_checked import rederive_checked
+from gates.rederive_outcomes import rederive_searched_outcomes
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import TaskSection
 from gates.report import read_report
@@ -76,6 +77,7 @@ def rederive_searched(
     _files(root, params, rows, journals)
     if journals:
         rederive_checked(root, "E", FAILURE_SEARCH, held_to, journals)
+        rederive_searched_outcomes(params, rows, journals)
 
 
 def _asked_again(
