@@ -136,8 +136,12 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
 
 
 @pytest.fixture
-def root(tmp_path):
-    """Stress evidence of two methods on two starts, as its journals tell it."""
+def root(tmp_path, monkeypatch):
+    """Stress evidence of two methods on two starts, as its journals tell it.
+
+    No world made it: what recorded commands lead to is asked in `test_rederive_outcomes`.
+    """
+    monkeypatch.setattr(module, "rederive_outcomes", lambda *given: None)
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
     (tmp_path / "artifacts" / "latency").mkdir(parents=True)
     write_rows(tmp_path / "artifacts" / "latency" / "latency.parquet", LatencyRow, LATENCY)

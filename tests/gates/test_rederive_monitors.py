@@ -4,7 +4,7 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from _probed import ROOT_SEED, SECTION, make_bench, write_probed
+from _probed import LIMIT_S, ROOT_SEED, SECTION, make_bench, write_probed
 
 from gates import rederive as module
 from gates.rederive_monitors import rederive_monitors
@@ -24,7 +24,8 @@ SCORES, ROLLOUTS = f"{MONITORS}/scores.parquet", f"{MONITORS}/rollouts.parquet"
 
 @pytest.fixture(scope="module")
 def params(kit):
-    changes = {"monitors": SECTION, "seed": ROOT_SEED}
+    stress = {**kit.PARAMS["stress"], "episode_limit_s": LIMIT_S}
+    changes = {"monitors": SECTION, "seed": ROOT_SEED, "stress": stress}
     return {**kit.PARAMS, **changes, "task": {"name": "tabletop_insertion"}}
 
 
