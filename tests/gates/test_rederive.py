@@ -190,6 +190,15 @@ def test_true_evidence_stands(root):
     assert row["latency_p95_s"] == FIRST_S
 
 
+def test_the_commands_of_every_journal_are_played_again(root, monkeypatch):
+    asked = []
+    monkeypatch.setattr(module, "rederive_outcomes", lambda *given: asked.append(given))
+    rederive(root, "D")
+    journals = sorted((root / STRESS / "journals").glob("*.mcap"))
+    assert asked == [(yaml.safe_load((root / "params.yaml").read_text()), journals)]
+    assert len(journals) == len(NAMES)
+
+
 def test_a_term_that_was_not_drawn_is_refused_where_the_sum_is_the_same(root, monkeypatch):
     for term, more_s in (("encode_s", 0.001), ("sample_s", -0.001)):
         monkeypatch.setitem(TERMS, term, TERMS[term] + more_s)

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gates import rederive, rederive_monitors, rederive_searched
 from gates import rederive_outcomes as module
 from gates.played_again import Played, Recorded, recorded_rollouts
 from gates.rederive_outcomes import (
@@ -349,13 +348,6 @@ def test_a_rollout_is_played_as_it_was_rolled_out_to_the_last_bit(rollouts, para
         states = [e.payload for e in one.journal.events() if e.kind == "state"]
         assert list(again.states) == states
         assert begun[-1].state_sha256() == one.world.state_sha256()
-
-
-def test_gate_d_the_monitors_and_the_search_ask_for_it():
-    """Their own tests run it on what their stages wrote; here that the name is the same."""
-    assert rederive.rederive_outcomes is rederive_outcomes
-    assert rederive_monitors.rederive_probed_outcomes is rederive_probed_outcomes
-    assert rederive_searched.rederive_searched_outcomes is rederive_searched_outcomes
 
 
 def test_a_command_that_is_no_action_is_bad_input_or_refused(asked):
