@@ -224,13 +224,13 @@ def _hold(cells: Cells, place: str, recorded: Recorded) -> None:
     gate, ticks, how = cells.gate, _ticks(recorded, cells), _how(recorded)
     if how not in (*ENDS, *ENDLESS):
         refuse(gate, f"{place}: outcome", recorded.outcome or "nothing", "an end of a rollout")
-    if stray := recorded.between_ticks(cells.period_s):
-        found = f"something at {stray[0]} ns"
-        refuse(gate, f"{place}: commanded", found, "one command at most a tick, at its time")
     wrong = ticks != cells.limit_ticks if how is Outcome.TIMEOUT else ticks > cells.limit_ticks
     if wrong:
         limit = f"as the plan has it, whose time is over after {cells.limit_s:.3f} s"
         refuse(gate, f"{place}: ends", f"{how} after {ticks * cells.period_s:.3f} s", limit)
+    if stray := recorded.between_ticks(cells.period_s):
+        found = f"something at {stray[0]} ns"
+        refuse(gate, f"{place}: commanded", found, "one command at most a tick, at its time")
     again = _played(cells, recorded)
     _went(cells, place, recorded, again)
     # Where so little decides another processor may decide otherwise: then either end is true.

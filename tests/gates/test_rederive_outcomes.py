@@ -81,10 +81,6 @@ def does(plan, rollout):
     return plan(rollout)
 
 
-def into_the_post(plan, rollout):
-    return straight(rollout)
-
-
 def rests(plan, rollout):
     return np.tile(rollout.world.last_action, (HORIZONS.prediction_horizon, 1))[None]
 
@@ -98,7 +94,7 @@ def rollouts(task, roll_out):
     starts = matched_starts(task, root_seed=PARAMS["seed"], count=3)
     push, hard = SidewaysPush(**PUSH), SidewaysPush(**HARD)
     made = {
-        "nominal": roll_out(starts, (does, into_the_post, rests)),
+        "nominal": roll_out(starts, (does, lambda _, one: straight(one), rests)),
         "push": roll_out(starts, (does, does, does), condition="push", schedule=push),
         "hard": roll_out(starts, (does, does, does), condition="hard", schedule=hard),
     }
@@ -174,6 +170,9 @@ def test_nothing_goes_on_behind_the_end_of_the_time(asked, params, monkeypatch):
     monkeypatch.setitem(params["stress"], "episode_limit_s", 4.0)
     with pytest.raises(RefusedError, match=r"ends is success after [5-7].*over after 4\.000 s"):
         asked()
+    endless = Recorded({}, outcome="success", end_ns=1 << 62)  # counted, never played
+    with pytest.raises(RefusedError, match="ends is success after"):
+        module._hold(module._cells("D", None, params, None), "one", endless)
 
 
 def test_another_command_leads_elsewhere(asked):
@@ -186,17 +185,13 @@ def test_another_command_leads_elsewhere(asked):
         asked(change=at_tick(0, "accept", 40, aside))
 
 
-def test_a_command_that_is_left_out_or_between_two_ticks_is_refused(asked):
+def test_a_command_that_is_left_out_between_two_ticks_or_one_too_many_is_refused(asked):
     with pytest.raises(RefusedError, match=r"measured at 2\.050 s is"):
         asked(change=at_tick(0, "accept", 40, lambda p: None))
-
     with pytest.raises(RefusedError, match=r"commanded is something at \d+1 ns, required one"):
         asked(late_ns=1)
-
-
-def test_two_commands_at_one_tick_are_one_too_many():
-    recorded = Recorded({}, commands=[(0, np.zeros(10)), (0, np.ones(10))], end_ns=50_000_000)
-    assert recorded.between_ticks(0.05) == [0]
+    twice = Recorded({}, commands=[(0, np.zeros(10)), (0, np.ones(10))], end_ns=50_000_000)
+    assert twice.between_ticks(0.05) == [0]
 
 
 @pytest.mark.parametrize(
@@ -204,7 +199,7 @@ def test_two_commands_at_one_tick_are_one_too_many():
     [
         ("q_rad", lambda v: [v[0] + 1e-4, *v[1:]], r"q_rad up to 0\.0001 beside it"),
         ("q_rad", lambda v: v[:-1], "q_rad up to inf beside it"),
-        ("tcp_m", lambda v: [v[0], v[1], float("1e3")], "tcp_m up to"),
+        ("tcp_m", lambda v: [v[0], v[1], 1e3], "tcp_m up to"),
         ("gripper_m", lambda v: v + 0.01, r"gripper_m up to 0\.01 beside it"),
         ("force_n", lambda v: v + 0.5, "0.5 N"),
     ],
@@ -319,8 +314,8 @@ def test_rollouts_of_a_search_begin_where_it_asked(task, rollouts, params, tmp_p
     path = tmp_path / "flow__nominal.mcap"
     write_journal(path, [one.journal for one in rollouts["nominal"]])
     starts = matched_starts(task, root_seed=PARAMS["seed"], count=3)
-    row = SimpleNamespace(method="flow", perturbation="nominal")
-    rows = [SimpleNamespace(**vars(row), start=n, scene_start=s.to_json())
+    named = {"method": "flow", "perturbation": "nominal"}
+    rows = [SimpleNamespace(**named, start=n, scene_start=s.to_json())
             for n, s in enumerate(starts)]  # fmt: skip
     rederive_searched_outcomes(params, rows, [path])
     rows[0].scene_start, rows[1].scene_start = rows[1].scene_start, rows[0].scene_start
@@ -333,16 +328,14 @@ def test_a_rollout_is_played_as_it_was_rolled_out_to_the_last_bit(rollouts, para
     path = tmp_path / "flow__push.mcap"
     write_journal(path, [one.journal for one in rollouts["push"]])
     recorded = recorded_rollouts(path)
-    begun = []
+    task, begun = rollouts["push"][0].setup.task, []
+    starts = matched_starts(task, root_seed=PARAMS["seed"], count=3)
 
     def begin(labels):
-        world = world_of(labels)
-        begun.append(world)
-        return world
+        begun.append(module._world(task, starts, labels))
+        return begun[-1]
 
-    cells = module._cells("D", rollouts["push"][0].setup.task, params, begin)
-    starts = matched_starts(cells.task, root_seed=PARAMS["seed"], count=3)
-    world_of = lambda labels: module._world(cells.task, starts, labels)  # noqa: E731
+    cells = module._cells("D", task, params, begin)
     for one in rollouts["push"]:
         again = module._played(cells, recorded[one.journal.session])
         states = [e.payload for e in one.journal.events() if e.kind == "state"]
