@@ -51,7 +51,7 @@ FORCE_N = 0.1
 """Of a force, N: sixteen times what 1e-7 moved it by."""
 EDGE_M = 1e-7
 """An outcome that so little turns over another processor may turn over too."""
-ENDS = {
+ENDS: Mapping[Outcome | None, Outcome] = {
     Outcome.SUCCESS: Outcome.SUCCESS, Outcome.ASSISTED: Outcome.SUCCESS,
     Outcome.COLLISION: Outcome.COLLISION, Outcome.FORCE_STOP: Outcome.FORCE_STOP,
 }  # fmt: skip
