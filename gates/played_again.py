@@ -29,6 +29,8 @@ Ended = tuple[int, Outcome]
 
 POSE = ("q_rad", "tcp_m", "tcp_rotation", "gripper_m")
 """What of a measured state says where the arm is."""
+FORCE = "force_n"
+"""What of it says how hard something was touched in the period before, N."""
 
 
 @dataclass
@@ -51,18 +53,20 @@ class Recorded:
     outcome: str = ""
     end_ns: int = 0
 
-    def read(self, kind: str, m: Message) -> None:
+    def read(self, kind: str, payload: Message) -> None:
         """Take an event in; of the same kind a person's and recovery's commands are."""
         if kind in ("accept", "fallback"):
-            self.commands.append((m["t"], floats(m["action"])))
+            self.commands.append((payload["t"], floats(payload["action"])))
         elif kind == "push":
-            self.pushes.append((m["t"], float(m["force_n"]), float(m["duration_s"])))
+            self.pushes.append(
+                (payload["t"], float(payload["force_n"]), float(payload["duration_s"]))
+            )
         elif kind == "state":
-            self.states[m["t"]] = m
+            self.states[payload["t"]] = payload
         elif kind == "outcome":
-            self.outcome = str(m["outcome"])
+            self.outcome = str(payload["outcome"])
         elif kind == "end":
-            self.end_ns = m["t"]
+            self.end_ns = payload["t"]
 
     def ticks(self, period_s: float) -> int:
         """How many periods it lasted."""
@@ -90,12 +94,12 @@ def recorded_rollouts(path: Path) -> dict[str, Recorded]:
         KeyError, TypeError, ValueError: An event that cannot be read.
     """
     found: dict[str, Recorded] = {}
-    for kind, message in read_messages(path):
-        name = str(message.get("session"))
+    for kind, payload in read_messages(path):
+        name = str(payload.get("session"))
         if kind == "session":
-            found[name] = Recorded(dict(message["labels"]))
+            found[name] = Recorded(dict(payload["labels"]))
         else:
-            found[name].read(kind, message)
+            found[name].read(kind, payload)
     return found
 
 

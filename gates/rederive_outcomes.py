@@ -21,15 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from gates.played_again import POSE, Played, Recorded, play, recorded_rollouts
+from gates.played_again import FORCE, POSE, Played, Recorded, play, recorded_rollouts
 from gates.rederive_draws import some
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import refuse, root_seed, section
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.evidence.monitors.plan import judging, setting_thresholds, starts_of
-from genpolicy.evidence.monitors.settings import MonitorsSettings
-from genpolicy.evidence.rows.failures import SearchedRow
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.state import Outcome
@@ -101,58 +98,17 @@ def rederive_outcomes(params: Mapping[str, Any], journals: Sequence[Path]) -> No
     task = load_task(section(params, "task", TaskSection).name)
     count = section(params, "stress", StressSettings).starts
     starts = matched_starts(task, root_seed=root_seed(params), count=count)
-    cells = _cells("D", task, params, lambda labels: _world(task, starts, labels))
+    cells = cells_of("D", task, params, lambda labels: world_at(task, starts, labels))
     for path in journals:
         play_again(cells, path, OF_A_JOURNAL)
 
 
-def rederive_probed_outcomes(params: Mapping[str, Any], journals: Sequence[Path]) -> None:
-    """Play a sample of the rollouts of the monitors again, under their probes; nobody pushes there.
+def cells_of(gate: Gate, task: Task, params: Mapping[str, Any], begin: Begin) -> Cells:
+    """What rollouts of a ladder are played again in, as it plans them.
 
     Raises:
-        RefusedError: As of the comparison.
         ConfigError: A section of `params.yaml` cannot be read.
-        IntegrityError: A journal is missing or no regular file.
-        BadInputError: A journal cannot be read.
     """
-    settings, seed = section(params, "monitors", MonitorsSettings), root_seed(params)
-    task = load_task(section(params, "task", TaskSection).name)
-    conditions = {one.name: one for one in (*setting_thresholds(settings), *judging(settings))}
-
-    def begin(labels: Mapping[str, str]) -> World:
-        one = conditions[labels["perturbation"]]
-        texts = starts_of(task, one.kind, root_seed=seed, count=one.count)
-        return _world(task, [task.start_from_json(text) for text in texts], labels, one.probe)
-
-    for path in journals:
-        play_again(_cells("D", task, params, begin), path, OF_A_PROBE, pushed=False)
-
-
-def rederive_searched_outcomes(
-    params: Mapping[str, Any], rows: Sequence[SearchedRow], journals: Sequence[Path]
-) -> None:
-    """Play a sample of the rollouts of the failure search again, pushed as they say.
-
-    Raises:
-        RefusedError: As of the comparison.
-        ConfigError: A section of `params.yaml` cannot be read.
-        IntegrityError: A journal is missing or no regular file.
-        BadInputError: A journal cannot be read.
-    """
-    task = load_task(section(params, "task", TaskSection).name)
-    asked = {(row.method, row.perturbation, row.start): row.scene_start for row in rows}
-
-    def begin(labels: Mapping[str, str]) -> World:
-        number = int(labels["start"])
-        text = asked[labels["method"], labels["perturbation"], number]
-        return _world(task, {number: task.start_from_json(text)}, labels)
-
-    for path in journals:
-        play_again(_cells("E", task, params, begin), path, OF_A_PROBE)
-
-
-def _cells(gate: Gate, task: Task, params: Mapping[str, Any], begin: Begin) -> Cells:
-    """As a ladder plans them."""
     return Cells(
         gate=gate,
         task=task,
@@ -163,17 +119,22 @@ def _cells(gate: Gate, task: Task, params: Mapping[str, Any], begin: Begin) -> C
     )
 
 
-def _world(
+def world_at(
     task: Task,
     starts: Sequence[Start] | Mapping[int, Start],
     labels: Mapping[str, str],
     probe: str = NOMINAL_PROBE,
 ) -> World:
+    """The world of a rollout at rest at its start, under a probe.
+
+    Raises:
+        ValueError, IndexError, KeyError: Its labels name no such start.
+    """
     number = int(labels["start"])
     if number < 0:
         raise ValueError(f"start {number}")
     settings = WorldSettings(task.calibration_epochs[-1], probe, seed=number)
-    return task.make_world(starts[number], settings=settings)
+    return task.makeworld_at(starts[number], settings=settings)
 
 
 def play_again(cells: Cells, path: Path, count: int, *, pushed: bool = True) -> None:
@@ -257,16 +218,16 @@ def _went(cells: Cells, place: str, recorded: Recorded, again: Played) -> None:
         told = recorded.states.get(to_ns(tick * cells.period_s))
         if told is None:
             refuse(cells.gate, when, "nothing", "a state at every tick")
-        touches = touches or own["force_n"] > 0.0
+        touches = touches or own[FORCE] > 0.0
         limit = IN_CONTACT if touches else FREE
         for name in POSE:
             off = _off(told[name], own[name])
             if not off <= limit:
                 expected = f"where its recorded commands lead, within {limit:g}"
                 refuse(cells.gate, when, f"{name} up to {off:.3g} beside it", expected)
-        if not _off(told["force_n"], own["force_n"]) <= FORCE_N:
-            expected = f"{own['force_n']} N, which its recorded commands lead to, within {FORCE_N}"
-            refuse(cells.gate, when, f"{told['force_n']} N", expected)
+        if not _off(told[FORCE], own[FORCE]) <= FORCE_N:
+            expected = f"{own[FORCE]} N, which its recorded commands lead to, within {FORCE_N}"
+            refuse(cells.gate, when, f"{told[FORCE]} N", expected)
 
 
 def _off(told: Any, own: Any) -> float:

@@ -8,11 +8,9 @@ import pytest
 
 from gates import rederive_outcomes as module
 from gates.played_again import Played, Recorded, recorded_rollouts
-from gates.rederive_outcomes import (
-    rederive_outcomes,
-    rederive_probed_outcomes,
-    rederive_searched_outcomes,
-)
+from gates.rederive_monitors import rederive_probed_outcomes
+from gates.rederive_outcomes import rederive_outcomes
+from gates.rederive_searched import rederive_searched_outcomes
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.monitors.plan import starts_of
@@ -172,7 +170,7 @@ def test_nothing_goes_on_behind_the_end_of_the_time(asked, params, monkeypatch):
         asked()
     endless = Recorded({}, outcome="success", end_ns=1 << 62)  # counted, never played
     with pytest.raises(RefusedError, match="ends is success after"):
-        module._hold(module._cells("D", None, params, None), "one", endless)
+        module._hold(module.cells_of("D", None, params, None), "one", endless)
 
 
 def test_another_command_leads_elsewhere(asked):
@@ -332,10 +330,10 @@ def test_a_rollout_is_played_as_it_was_rolled_out_to_the_last_bit(rollouts, para
     starts = matched_starts(task, root_seed=PARAMS["seed"], count=3)
 
     def begin(labels):
-        begun.append(module._world(task, starts, labels))
+        begun.append(module.world_at(task, starts, labels))
         return begun[-1]
 
-    cells = module._cells("D", task, params, begin)
+    cells = module.cells_of("D", task, params, begin)
     for one in rollouts["push"]:
         again = module._played(cells, recorded[one.journal.session])
         states = [e.payload for e in one.journal.events() if e.kind == "state"]
