@@ -134,7 +134,7 @@ def world_at(
     if number < 0:
         raise ValueError(f"start {number}")
     settings = WorldSettings(task.calibration_epochs[-1], probe, seed=number)
-    return task.makeworld_at(starts[number], settings=settings)
+    return task.make_world(starts[number], settings=settings)
 
 
 def play_again(cells: Cells, path: Path, count: int, *, pushed: bool = True) -> None:
