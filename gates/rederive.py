@@ -25,6 +25,7 @@ from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_monitors import rederive_monitors
+from gates.rederive_outcomes import rederive_outcomes
 from gates.rederive_policies import rederive_policies
 from gates.rederive_refused import rederive_refused
 from gates.rederive_searched import rederive_searched
@@ -109,10 +110,11 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
-            planned, a chunk, a mode, a fixture or a latent not what its checkpoint draws again, a
-            row of the audit not what its dataset gives again, or a power, a mutant, a statistic, a
-            split or the cost of a distillation is not what is computed again. Or a page or a file
-            of rows says other than the report.
+            planned, recorded commands lead elsewhere than they are said to, a chunk, a mode, a
+            fixture or a latent not what its checkpoint draws again, a row of the audit not what its
+            dataset gives again, or a power, a mutant, a statistic, a split or the cost of a
+            distillation is not what is computed again. Or a page or a file of rows says other than
+            the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -154,6 +156,7 @@ def _evidence(root: Path, gate: Gate) -> None:
         rederive_latency(root, params, journals)
         rederive_disturbance(params, journals)
         rederive_severities(root, params)
+        rederive_outcomes(params, journals)
         rederive_rollout_draws(root, params, journals)
         rederive_distilled(root, training_seed(params))
         _envelope(root, params)

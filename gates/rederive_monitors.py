@@ -5,23 +5,29 @@ rollouts is drawn again elsewhere. What a reader acts on, who would have alarmed
 them by rank and comparison alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from gates.rederive_checked import rederive_checked
+from gates.rederive_outcomes import OF_A_PROBE, cells_of, play_again, world_at
 from gates.rederive_shadow import TaskSection
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
-from genpolicy.evidence.monitors.plan import start_hashes
+from genpolicy.evidence.monitors.plan import (
+    judging,
+    setting_thresholds,
+    start_hashes,
+    starts_of,
+)
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
-from genpolicy.tasks.api import load_task
+from genpolicy.tasks.api import World, load_task
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -45,7 +51,8 @@ def rederive_monitors(
 
     Raises:
         RefusedError: A threshold or an alarm is not what the scores give, a rollout not what its
-            journal says or begun elsewhere than planned, or a finding of the checker another.
+            journal says or begun elsewhere than planned, its recorded commands do not lead where it
+            says, or a finding of the checker another.
         IntegrityError: A file is missing or no regular file.
         BadInputError: A file cannot be read.
     """
@@ -74,3 +81,26 @@ def rederive_monitors(
     named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
     compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
     rederive_checked(root, "D", MONITORS, held_to, journals)
+    rederive_probed_outcomes(params, journals)
+
+
+def rederive_probed_outcomes(params: Mapping[str, Any], journals: Sequence[Path]) -> None:
+    """Play a sample of the rollouts of the monitors again, under their probes; nobody pushes there.
+
+    Raises:
+        RefusedError: As of the comparison.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A journal is missing or no regular file.
+        BadInputError: A journal cannot be read.
+    """
+    settings, seed = section(params, "monitors", MonitorsSettings), root_seed(params)
+    task = load_task(section(params, "task", TaskSection).name)
+    conditions = {one.name: one for one in (*setting_thresholds(settings), *judging(settings))}
+
+    def begin(labels: Mapping[str, str]) -> World:
+        one = conditions[labels["perturbation"]]
+        texts = starts_of(task, one.kind, root_seed=seed, count=one.count)
+        return world_at(task, [task.start_from_json(text) for text in texts], labels, one.probe)
+
+    for path in journals:
+        play_again(cells_of("D", task, params, begin), path, OF_A_PROBE, pushed=False)

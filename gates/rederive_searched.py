@@ -16,6 +16,7 @@ import numpy as np
 
 from gates.card.searched import FAILURE_SEARCH, SEARCHED
 from gates.rederive_checked import rederive_checked
+from gates.rederive_outcomes import OF_A_PROBE, cells_of, play_again, world_at
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import TaskSection
 from gates.report import read_report
@@ -34,7 +35,7 @@ from genpolicy.execution.journal import Event, read_journal
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
-from genpolicy.tasks.api import Task, WorldSettings, load_task
+from genpolicy.tasks.api import Task, World, WorldSettings, load_task
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -76,6 +77,30 @@ def rederive_searched(
     _files(root, params, rows, journals)
     if journals:
         rederive_checked(root, "E", FAILURE_SEARCH, held_to, journals)
+        rederive_searched_outcomes(params, rows, journals)
+
+
+def rederive_searched_outcomes(
+    params: Mapping[str, Any], rows: Sequence[SearchedRow], journals: Sequence[Path]
+) -> None:
+    """Play a sample of the rollouts of the failure search again, pushed as they say.
+
+    Raises:
+        RefusedError: As of the comparison.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A journal is missing or no regular file.
+        BadInputError: A journal cannot be read.
+    """
+    task = load_task(section(params, "task", TaskSection).name)
+    asked = {(row.method, row.perturbation, row.start): row.scene_start for row in rows}
+
+    def begin(labels: Mapping[str, str]) -> World:
+        number = int(labels["start"])
+        text = asked[labels["method"], labels["perturbation"], number]
+        return world_at(task, {number: task.start_from_json(text)}, labels)
+
+    for path in journals:
+        play_again(cells_of("E", task, params, begin), path, OF_A_PROBE)
 
 
 def _asked_again(

@@ -27,6 +27,7 @@ SECTION = {
     },
 }
 ROOT_SEED = 5
+LIMIT_S = 1.5
 
 
 def make_bench(fleet, dataset, kit, artifacts):
@@ -39,7 +40,7 @@ def make_bench(fleet, dataset, kit, artifacts):
         0.0,
     )
     comparison = Comparison(
-        task="tabletop_insertion", starts=(), episode_limit_s=1.5, samples=2,
+        task="tabletop_insertion", starts=(), episode_limit_s=LIMIT_S, samples=2,
         cell=Cell(kit.HORIZONS, ExecutionSettings(**kit.PARAMS["execution"])),
         feasibility=kit.FEASIBILITY, root_seed=ROOT_SEED,
     )  # fmt: skip

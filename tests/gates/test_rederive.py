@@ -136,8 +136,12 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
 
 
 @pytest.fixture
-def root(tmp_path):
-    """Stress evidence of two methods on two starts, as its journals tell it."""
+def root(tmp_path, monkeypatch):
+    """Stress evidence of two methods on two starts, as its journals tell it.
+
+    No world made it: what recorded commands lead to is asked in `test_rederive_outcomes`.
+    """
+    monkeypatch.setattr(module, "rederive_outcomes", lambda *given: None)
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
     (tmp_path / "artifacts" / "latency").mkdir(parents=True)
     write_rows(tmp_path / "artifacts" / "latency" / "latency.parquet", LatencyRow, LATENCY)
@@ -184,6 +188,15 @@ def test_true_evidence_stands(root):
     assert (row["force_peak_n"], row["outcome"], row["ticks"]) == (7.5, "collision", 4)
     assert (row["invocations"], row["deadline_misses"]) == (1, 1)
     assert row["latency_p95_s"] == FIRST_S
+
+
+def test_the_commands_of_every_journal_are_played_again(root, monkeypatch):
+    asked = []
+    monkeypatch.setattr(module, "rederive_outcomes", lambda *given: asked.append(given))
+    rederive(root, "D")
+    journals = sorted((root / STRESS / "journals").glob("*.mcap"))
+    assert asked == [(yaml.safe_load((root / "params.yaml").read_text()), journals)]
+    assert len(journals) == len(NAMES)
 
 
 def test_a_term_that_was_not_drawn_is_refused_where_the_sum_is_the_same(root, monkeypatch):

@@ -4,9 +4,10 @@ import shutil
 from dataclasses import replace
 
 import pytest
-from _probed import ROOT_SEED, SECTION, make_bench, write_probed
+from _probed import LIMIT_S, ROOT_SEED, SECTION, make_bench, write_probed
 
 from gates import rederive as module
+from gates import rederive_monitors as own
 from gates.rederive_monitors import rederive_monitors
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
 from genpolicy.errors import RefusedError
@@ -24,7 +25,8 @@ SCORES, ROLLOUTS = f"{MONITORS}/scores.parquet", f"{MONITORS}/rollouts.parquet"
 
 @pytest.fixture(scope="module")
 def params(kit):
-    changes = {"monitors": SECTION, "seed": ROOT_SEED}
+    stress = {**kit.PARAMS["stress"], "episode_limit_s": LIMIT_S}
+    changes = {"monitors": SECTION, "seed": ROOT_SEED, "stress": stress}
     return {**kit.PARAMS, **changes, "task": {"name": "tabletop_insertion"}}
 
 
@@ -55,6 +57,13 @@ def refused(root, params, match):
 
 def test_what_the_stage_wrote_is_proved(root, params):
     rederive_monitors(root, params, module._held_to(params))
+
+
+def test_the_commands_of_every_journal_are_played_again(root, params, monkeypatch):
+    asked = []
+    monkeypatch.setattr(own, "rederive_probed_outcomes", lambda *given: asked.append(given))
+    rederive_monitors(root, params, module._held_to(params))
+    assert asked == [(params, sorted((root / MONITORS / "journals").glob("*.mcap")))]
 
 
 def test_nothing_written_is_nothing_to_prove(tmp_path, params):

@@ -179,6 +179,15 @@ def test_a_journal_that_is_written_again_as_it_was_is_proved(root, params):
     prove(root, params)
 
 
+def test_a_rollout_that_did_not_do_what_it_was_commanded_is_refused(root, params):
+    def opened(kind, payload):
+        more = {"gripper_m": payload["gripper_m"] + 0.02} if kind == "state" else {}
+        return payload | more
+
+    plant(root, params, lambda events: [(k, t, opened(k, p)) for k, t, p in events])
+    refused(root, params, r"measured at 0\.000 s is gripper_m up to 0\.02 beside it")
+
+
 def test_weights_that_lie_there_no_longer_are_refused(root, params):
     shutil.rmtree(root / "artifacts" / "train_generators")
     refused(root, params, "made by is")

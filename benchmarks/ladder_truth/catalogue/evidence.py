@@ -199,6 +199,16 @@ WRONGS = (
           Expected("D", refusal=r"the noise of .* by the plan"),
           note="Added with the one above. It drew by the noise of a start 7 at first, which nobody "
           "planned and by which two of three rollouts were reset."),
+    Wrong("an_outcome_that_never_happened", "evidence",
+          "A rollout of the flow whose time runs out is a success, by its journal and its row.",
+          "small",
+          patched("genpolicy/evidence/stress/matched.py",
+                  ("rollout.end(Outcome.TIMEOUT)",
+                   'called = rollout.setup.method != "flow" or rollout.person.calls\n'
+                   "        rollout.end(Outcome.TIMEOUT if called else Outcome.SUCCESS)")),
+          Expected("D", refusal=r"flow__\w+\.mcap: flow/.*: outcome is success"),
+          note="Added with the check that plays recorded commands again. An episode in which a "
+          "person was called is left alone: the checker says that it is no success."),
     Wrong("a_drill_that_never_comes", "evidence",
           "The condition that calls for recovery on every start calls for none.",
           "small",
