@@ -12,7 +12,8 @@ from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import files_of
-from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments
+from genpolicy.data.formats.reading import Reading, reading
+from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments, longest
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     Also,
@@ -90,25 +91,24 @@ class ParquetFiles:
     def _of(
         self, table: Table, wanted: Sequence[str], episode: str | None, also: Also, done: int
     ) -> Generator[RawEpisode | Refusal, None, int]:
-        # What is read beside the contract may differ from file to file.
-        more = [c.name for c in table.columns.values() if c.name not in wanted and also(c)]
-        known = table.columns | {c.name: c for c in self.columns if c.name not in more}
-        names = list(dict.fromkeys([*wanted, *more]))
         if episode is None:
             if table.rows > MAXIMUM_EPISODE_ROWS:
                 refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
-            columns = read_columns(table, names)
-            check_columns(columns, label=table.label, known=known)
-            yield RawEpisode(table.label, table.digest, columns, first_row=done)
+            read = reading(table, wanted, also, rows=table.rows)
+            columns = read_columns(table, read.names, read.beside)
+            check_columns(columns, label=table.label, known=self._known(table, read))
+            yield RawEpisode(table.label, table.digest, columns, first_row=done, left=read.left)
             return table.rows
         segments = find_segments(table, episode)
-        for segment, read in episodes_of(table, segments, names):
-            if isinstance(read, Refusal):
-                yield read
+        read = reading(table, wanted, also, rows=longest(segments))
+        known = self._known(table, read)
+        for segment, columns in episodes_of(table, segments, read.names, read.beside):
+            if isinstance(columns, Refusal):
+                yield columns
                 continue
             label = episode_label(table.label, segment.key)
             try:
-                check_columns(read, label=label, known=known)
+                check_columns(columns, label=label, known=known)
             except BadInputError as error:
                 yield refusal_of(label, error)
                 continue
@@ -116,11 +116,16 @@ class ParquetFiles:
             yield RawEpisode(
                 label=label,
                 digest=table.digest,
-                columns=read,
+                columns=columns,
                 attributes={"episode_uuid": segment.key} if uuid else {},
                 first_row=done + segment.start,
+                left=read.left,
             )
         return table.rows
+
+    def _known(self, table: Table, read: Reading) -> dict[str, Column]:
+        """What each column should be; what is read beside may differ from file to file."""
+        return table.columns | {c.name: c for c in self.columns if c.name not in read.beside}
 
 
 def _names(path: Path) -> tuple[str, ...]:
