@@ -16,9 +16,16 @@ from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.leaves import holds_several
-from genpolicy.data.formats.lerobot_meta import data_files, read_episodes, read_info, read_tasks
+from genpolicy.data.formats.lerobot_meta import (
+    data_files,
+    is_of_layout,
+    read_episodes,
+    read_info,
+    read_tasks,
+)
 from genpolicy.data.formats.reading import Reading, reading
 from genpolicy.data.formats.segments import episodes_of, find_segments, longest
+from genpolicy.data.formats.sidecars import of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     Also,
@@ -77,7 +84,9 @@ class LeRobotDataset:
             task="task" if self._tasks else None,
         )
         self.count = len(self._files) if self._by_file else (self._info.episodes or None)
-        self.notes = (*notes, *self._disagreements())
+        data = {self._label(file) for _, file in self._files}
+        sidecars = of_folder(path, lambda name: name in data or is_of_layout(name))
+        self.notes = (*notes, *self._disagreements(), *sidecars)
 
     def episodes(
         self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing

@@ -24,6 +24,11 @@ TASKS_V2 = "meta/tasks.jsonl"
 TASKS_V3 = "meta/tasks.parquet"
 # What the layout itself says of an episode: statistics, and where its rows and pictures lie.
 OWN = ("stats/", "data/", "meta/", "videos/")
+FILES = (
+    *(INFO, EPISODES_V2, TASKS_V2, TASKS_V3, "meta/stats.json", "meta/episodes_stats.jsonl"),
+    *("meta/modality.json", "meta/subtasks.parquet"),
+)
+FOLDERS = (f"{EPISODES_V3}/", "videos/", "images/")
 DEFAULT_PATH = {
     "v2": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
     "v3": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
@@ -139,6 +144,11 @@ def data_files(root: Path, info: Info) -> list[tuple[int, Path]]:
     if info.version.startswith("v2"):
         return sorted((number, path) for _, number, path in found)
     return [(place, path) for place, (_, _, path) in enumerate(sorted(found))]
+
+
+def is_of_layout(name: str) -> bool:
+    """Whether a file is one that the layout has beside its data, by its relative POSIX path."""
+    return name in FILES or name.startswith(FOLDERS)
 
 
 def read_lines(path: Path) -> Iterator[dict[str, Any]]:

@@ -14,6 +14,7 @@ from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import files_of
 from genpolicy.data.formats.reading import Reading, reading
 from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments, longest
+from genpolicy.data.formats.sidecars import among, of_file, of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     Also,
@@ -51,7 +52,8 @@ class ParquetFiles:
         self.columns: tuple[Column, ...] = tuple(self._table.columns.values())
         self.labels = labels_of(self.columns)
         skipped = ", ".join(self._table.skipped)
-        self.notes = (f"Not read: {skipped} (neither numbers nor text).",) if skipped else ()
+        unread = (f"Not read: {skipped} (neither numbers nor text).",) if skipped else ()
+        self.notes = (*unread, *self._sidecars(path))
         self.count = None if self.labels.episode is not None else len(self._files)
 
     def episodes(
@@ -66,6 +68,11 @@ class ParquetFiles:
                     done += yield from self._of(table, wanted, episode, also, done)
             except BadInputError as error:
                 yield refusal_of(label, error)
+
+    def _sidecars(self, path: Path) -> tuple[str, ...]:
+        if not path.is_dir():
+            return of_file(path)
+        return of_folder(path, among({f.relative_to(path).as_posix() for f in self._files}))
 
     def _first(self) -> Table:
         """The file that describes all, whatever the files are called.

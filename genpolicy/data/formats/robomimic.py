@@ -32,6 +32,7 @@ from genpolicy.data.formats.hdf5_single import (
 )
 from genpolicy.data.formats.leaves import MAXIMUM_TEXT, leaves
 from genpolicy.data.formats.masks import read_masks, say
+from genpolicy.data.formats.sidecars import among, of_file, of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     MAXIMUM_VALUE_BYTES,
@@ -58,8 +59,12 @@ class RobomimicFile:
 
     known: ImportContract | None = None
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, sidecars: Sequence[str] = ()) -> None:
         """Describe the first readable demonstration and list all.
+
+        Args:
+            path: The file.
+            sidecars: The notes on files beside it.
 
         Raises:
             BadInputError: Not HDF5, without demonstrations, or with links to other places.
@@ -87,7 +92,7 @@ class RobomimicFile:
         extra = [Column(n, None, "text", per_episode=True) for n in sorted(attributes)]
         self.columns: tuple[Column, ...] = (*columns, *extra)
         self.labels = labels_of(self.columns, episode=None, frame=None)
-        self.notes = tuple(notes)
+        self.notes = (*notes, *sidecars)
         self.count = len(self._demos)
 
     def episodes(
@@ -146,7 +151,10 @@ class RobomimicFile:
 
 def open_source(path: Path) -> RobomimicFile:
     """A robomimic file, or the only one of a folder, described; see `RobomimicFile`."""
-    return RobomimicFile(only_hdf5(path))
+    file = only_hdf5(path)
+    if not path.is_dir() or file == path:
+        return RobomimicFile(file, of_file(file))
+    return RobomimicFile(file, of_folder(path, among({file.relative_to(path).as_posix()})))
 
 
 @contextmanager
