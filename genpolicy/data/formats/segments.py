@@ -62,7 +62,8 @@ def find_segments(table: Table, column: str) -> list[Segment]:
             refuse(f"{table.label}: {column}", found, "a table sorted by episode")
     stops = [*edges[1:], done]
     return [
-        Segment(_key(key), start, stop) for key, start, stop in zip(keys, edges, stops, strict=True)
+        Segment(key_of(key), start, stop)
+        for key, start, stop in zip(keys, edges, stops, strict=True)
     ]
 
 
@@ -162,7 +163,8 @@ def _drop(rows: _Rows, segment: Segment) -> None:
         return
 
 
-def _key(value: Any) -> str:
+def key_of(value: Any) -> str:
+    """An identifier as text, whole numbers without a point."""
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return str(value)
