@@ -44,6 +44,7 @@ SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+UNEVEN = "no numbers in an episode, or rows of different widths"
 
 
 def may_be_reason(name: str) -> bool:
@@ -114,6 +115,9 @@ class Reasons:
             self._runs.setdefault(name, {})[uuid] = runs
 
     def _add_wide(self, name: str, values: NDArray[Any], uuid: str) -> None:
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            self._left.setdefault(UNEVEN, set()).add(name)
+            return
         starts = starts_of(values)
         if self._holds(name, len(starts), len(values)):
             rows = [tuple(row) for row in values[starts].astype(np.float64).tolist()]

@@ -153,7 +153,7 @@ def is_plain(kind: pa.DataType) -> bool:
         return is_plain(kind.value_type)
     if pa.types.is_struct(kind):
         return all(is_plain(kind.field(k).type) for k in range(kind.num_fields))
-    text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_null(kind)
     return text or _is_number(kind) or pa.types.is_date(kind) or pa.types.is_time(kind)
 
 
