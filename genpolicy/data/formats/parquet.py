@@ -131,13 +131,13 @@ class ParquetFiles:
         )
         read = reading(table, wanted, also, rows=longest(segments))
         known = self._known(table, read)
-        for segment, columns in episodes_of(table, segments, read.names, read.beside):
-            if isinstance(columns, Refusal):
-                yield columns
+        for segment, found in episodes_of(table, segments, read.names, read.beside):
+            if isinstance(found, Refusal):
+                yield found
                 continue
             label = episode_label(table.label, segment.key)
             try:
-                check_columns(columns, label=label, known=known)
+                check_columns(found, label=label, known=known)
             except BadInputError as error:
                 yield refusal_of(label, error)
                 continue
@@ -145,7 +145,7 @@ class ParquetFiles:
             yield RawEpisode(
                 label=label,
                 digest=table.digest,
-                columns=columns,
+                columns=found,
                 attributes={"episode_uuid": segment.key} if uuid else {},
                 first_row=done + segment.start,
                 left=read.left,

@@ -5,7 +5,7 @@ changes from row to row is a signal, and what counts rows or judges the episode 
 Whatever is left out is noted by its name.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,8 +65,12 @@ class Reasons:
     def __init__(self, contract: ImportContract) -> None:
         """Nothing that the contract reads is gathered twice."""
         texts = [text for channel in contract.channels for text in channel.columns]
-        texts += contract.action.columns
-        read = {selector.column for selector in selectors(texts, where="contract")}
+        seen = selectors(texts, where="contract")
+        done = {item.column for item in selectors(contract.action.columns, where="contract")}
+        read = {item.column for item in seen} | done
+        self._elements = {(item.column, item.element) for item in seen}
+        # What is left out of an action is still done, not a reason for it.
+        self._partly = {item.column for item in seen} - done
         self._interventions = Interventions(contract.labels.is_intervention)
         # No layer of the audit looks at that label, so its column is asked as any other.
         labels = contract.labels.model_copy(update={"is_intervention": None}).named()
@@ -93,7 +97,7 @@ class Reasons:
         for name, why in raw.left.items():
             if name not in self._used and may_be_reason(name):
                 self._left.setdefault(why, set()).add(name)
-        for name, values in raw.columns.items():
+        for name, values in self._with_elements(raw.columns):
             width = values.shape[1] if values.ndim == 2 else None
             if values.ndim > 2 or not len(values) or not self.wants(Column(name, width)):
                 continue
@@ -108,6 +112,17 @@ class Reasons:
                 self._keep(name, text, uuid)
         for name, share in self._interventions.add(raw).items():
             self._runs.setdefault(name, {})[uuid] = Runs((0,), (share,))
+
+    def _with_elements(
+        self, columns: Mapping[str, NDArray[Any]]
+    ) -> Iterator[tuple[str, NDArray[Any]]]:
+        """The columns, and each number of a wide one of which the contract reads some others."""
+        for name, values in columns.items():
+            yield name, values
+            if name in self._partly and values.ndim == 2 and values.shape[1] <= WIDEST:
+                for k in range(values.shape[1]):
+                    if (name, k) not in self._elements:
+                        yield f"{name}[{k}]", values[:, k]
 
     def _add_runs(self, name: str, values: NDArray[Any], uuid: str) -> None:
         runs = runs_of(values)

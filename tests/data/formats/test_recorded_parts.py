@@ -244,3 +244,19 @@ def test_wide_columns_of_a_lerobot_dataset(layouts, tmp_path, version):
     kept, notes = values_of(root, tmp_path)
     assert len(set(single(kept["embedding"]))) == 2
     assert "Not read: struct (neither numbers nor text)." in notes
+
+
+def test_numbers_of_a_column_that_the_contract_leaves_out(layouts, tmp_path):
+    path = tables(
+        layouts, tmp_path / "r",
+        lamp=lambda i: layouts.vectors(np.tile([[0.5, i % 2, 1.0]], (30, 1))),
+    )  # fmt: skip
+    contract = open_dataset(path, out=tmp_path / "first").contract
+    channel = contract.channels[0]
+    short = channel.model_copy(
+        update={"columns": ["observation.state[0:2]"], "components": channel.components[:2]}
+    )
+    contract = contract.model_copy(update={"channels": [short], "pairing": None, "forms": {}})
+    contract = contract.model_copy(update={"frozen": None})
+    opened = open_dataset(path, out=tmp_path / "out", contract=contract)
+    assert "changes row by row: observation.state[2]." in " ".join(opened.notes)
