@@ -115,21 +115,36 @@ def check_head(head: Mapping[str, Any], place: str) -> None:
         refuse(place, f"{size} bytes", f"1 to {MAXIMUM_ARRAY_BYTES}")
 
 
-def read_array(folder: Path) -> NDArray[Any]:
-    """A whole array, its description checked before it is decoded."""
+def read_array(folder: Path, *, filled: bool = False) -> NDArray[Any]:
+    """A whole array, its description checked before it is decoded.
+
+    Args:
+        folder: The array.
+        filled: Whether a chunk that is not there holds the fill value instead of being lost.
+    """
     with _decoding(folder):
-        return np.asarray(_open(folder)[:])
+        return np.asarray(_open(folder, filled=filled)[:])
+
+
+def has_gaps(folder: Path) -> bool:
+    """Whether chunks of an array are not there: lost, or of the fill value alone."""
+    head = head_of(folder)
+    with _decoding(folder):
+        array = zarr.open_array(str(folder), mode="r", zarr_format=head["zarr_format"])
+        return bool(array.nchunks_initialized != array.nchunks)
 
 
 def slices(folder: Path, ends: Sequence[int]) -> Iterator[NDArray[Any]]:
     """The rows of each episode, decoded block by block: the whole array is never in memory.
+
+    A chunk that is not there holds the fill value, as zarr writes flags that are all zero.
 
     Args:
         folder: The array.
         ends: Row behind each episode, rising.
     """
     with _decoding(folder):
-        array = _open(folder)
+        array = _open(folder, filled=True)
         step = int(array.chunks[0]) * max(1, BLOCK_ROWS // int(array.chunks[0]))
         held: NDArray[Any] = np.asarray(array[:0])
         first = 0
@@ -152,11 +167,11 @@ def largest_block(folder: Path) -> int:
         return rows * math.prod(array.shape[1:]) * int(array.dtype.itemsize)
 
 
-def _open(folder: Path) -> zarr.Array[Any]:
+def _open(folder: Path, *, filled: bool) -> zarr.Array[Any]:
     place, head = str(folder), head_of(folder)
     check_head(head, place)
     array = zarr.open_array(place, mode="r", zarr_format=head["zarr_format"])
-    if array.nchunks_initialized != array.nchunks:
+    if not filled and array.nchunks_initialized != array.nchunks:
         refuse(place, f"{array.nchunks_initialized} chunks", f"all {array.nchunks} of them")
     return array
 

@@ -23,6 +23,7 @@ from genpolicy.data.formats.source import (
 from genpolicy.data.formats.zarr_arrays import (
     column_of,
     document_of,
+    has_gaps,
     head_of,
     largest_block,
     read_array,
@@ -43,18 +44,23 @@ class Described:
         by_row: Columns and folders of those with a value or several in each row.
         by_episode: Of those with a value or several for each episode.
         left: What is neither, and why.
+        gaps: Those by row or by episode of which chunks are not there.
     """
 
     by_row: dict[str, tuple[Column, Path]] = field(default_factory=dict)
     by_episode: dict[str, tuple[Column, Path]] = field(default_factory=dict)
     left: dict[str, str] = field(default_factory=dict)
+    gaps: list[str] = field(default_factory=list)
 
     def notes(self) -> list[str]:
         """What is left out, a sentence each."""
         why: dict[str, list[str]] = {}
         for name, reason in self.left.items():
             why.setdefault(reason, []).append(name)
-        return [f"Not read: {', '.join(names)} ({reason})." for reason, names in why.items()]
+        notes = [f"Not read: {', '.join(names)} ({reason})." for reason, names in why.items()]
+        if self.gaps:
+            notes.append(f"Chunks are not there, read as the fill value: {', '.join(self.gaps)}.")
+        return notes
 
 
 def described(arrays: Mapping[str, Path], *, rows: int, episodes: int) -> Described:
@@ -75,6 +81,8 @@ def described(arrays: Mapping[str, Path], *, rows: int, episodes: int) -> Descri
             found.left[name] = NO_NUMBERS
             continue
         length = int(head_of(folder)["shape"][0])
+        if length in (rows, episodes) and has_gaps(folder):
+            found.gaps.append(name)
         if length == rows:
             found.by_row[name] = column, folder
         elif length == episodes and (column.width or 1) <= WIDEST:
@@ -117,7 +125,7 @@ class Beside:
         for name, (_, folder) in sorted(found.by_episode.items()):
             if name not in read and also(Column(name, None)):
                 try:
-                    self._values[name] = read_array(folder)
+                    self._values[name] = read_array(folder, filled=True)
                 except BadInputError:
                     self.left[name] = NOT_READABLE
 
@@ -147,7 +155,11 @@ def lists_of(root: Path, episodes: int) -> dict[str, list[str]]:
     """
     found: dict[str, list[str]] = {}
     for place in PLACES:
-        for name, value in document_of(root / place).items():
+        try:
+            document = document_of(root / place)
+        except BadInputError:
+            continue  # nothing depends on it
+        for name, value in document.items():
             if isinstance(value, list) and len(value) == episodes > 1:
                 found.setdefault(str(name), [text_of(item) or "" for item in value])
     return found

@@ -166,7 +166,7 @@ def test_arrays_of_several_numbers_an_episode(layouts, tmp_path):
 
 def test_what_of_a_buffer_cannot_be_read_beside_refuses_nothing(layouts, tmp_path):
     path = buffer(
-        layouts, tmp_path, **{"data/wide": np.zeros((180, 5)), "meta/lamp": np.arange(EPISODES)}
+        layouts, tmp_path, **{"data/wide": np.ones((180, 5)), "meta/lamp": np.arange(EPISODES)}
     )
     for name in ("data/wide", "meta/lamp"):
         for chunk in (path / name).iterdir():
