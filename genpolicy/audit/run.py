@@ -21,6 +21,7 @@ from genpolicy.audit.looks import (
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support
+from genpolicy.audit.pairs import with_pairs
 from genpolicy.audit.persistence import summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
@@ -137,6 +138,7 @@ def audit(
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
     links = _links(data, settings, several)
+    data = replace(data, variables=with_pairs(data, links, root_seed=root_seed))
     modes = _modes(data, situations, links, replayed)
     told = predictions(data, settings, several, links, root_seed=root_seed)
     given = Given(replays=len(replayed), feasibility=admissible is not None)

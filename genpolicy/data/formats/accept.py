@@ -10,6 +10,7 @@ from genpolicy.data.assemble import FLAGS, STRATA, AcceptedEpisode, content_hash
 from genpolicy.data.checks import check_finite, check_frozen, check_range
 from genpolicy.data.contract import IngestContract
 from genpolicy.data.formats.contract import SI, ChannelSource, ImportContract, selectors
+from genpolicy.data.formats.interventions import flags_of
 from genpolicy.data.formats.source import RawEpisode, as_float, refuse
 from genpolicy.data.recording.episode import ACTION_STREAM, NOT_RECORDED, StreamSamples
 from genpolicy.data.resample import Rows
@@ -24,6 +25,7 @@ LARGEST_NS = 2.0**62
 MAXIMUM_TEXT = 200
 SUCCESS = ("success", "succeeded", "successful", "true", "1", "1.0", "yes")
 FAILURE = ("failure", "fail", "failed", "false", "0", "0.0", "no")
+BY_ROW = "is_intervention"
 MISSING = ("", "nan", "none", "null", NOT_RECORDED)
 
 
@@ -237,7 +239,14 @@ def _strata(raw: RawEpisode, contract: ImportContract) -> dict[str, str]:
 def _flag(raw: RawEpisode, contract: ImportContract, name: str) -> bool | None:
     if not hasattr(contract.labels, name):
         return None
-    text = _label(raw, getattr(contract.labels, name)).lower()
+    column = getattr(contract.labels, name)
+    if name == BY_ROW and column in raw.columns:
+        # Recorders of both flag each row in which a person acted.
+        flags = flags_of(raw.columns[column])
+        known = None if flags is None else flags[np.isfinite(flags)]
+        if known is not None:
+            return bool(known.any()) if len(known) else None
+    text = _label(raw, column).lower()
     if text == NOT_RECORDED:
         return None
     if text not in ("true", "1", "1.0", "false", "0", "0.0"):

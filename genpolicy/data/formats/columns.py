@@ -22,7 +22,10 @@ NAMES: dict[str, tuple[str, ...]] = {
     "calibration_epoch": ("calibration_epoch", "calibration", "calibration_id"),
     "outcome": ("outcome", "success", "is_success", "succeeded", "is_episode_successful"),
     "is_recovery": ("is_recovery", "recovery"),
-    "is_intervention": ("is_intervention", "intervention"),
+    "is_intervention": (
+        *("is_intervention", "intervention", "complementary_info.is_intervention"),
+        *("intervened", "human_intervention", "takeover"),
+    ),
 }
 BOOKKEEPING = {
     *("index", "reward", "rewards", "done", "dones", "terminated", "truncated", "success", "id"),

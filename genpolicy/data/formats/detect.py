@@ -30,6 +30,7 @@ LAYOUT_OF = {
 SHOWN = 5
 # A whole disk is not walked to count what is on it.
 MOST_DATASETS = 50
+MOST_NAMED = 100_000
 CHECK = "Check the path, or name the layout with --format."
 
 
@@ -42,11 +43,13 @@ class Contents:
         datasets: Folders below that are data sets of their own; no more are looked for after
             `MOST_DATASETS`.
         others: How many other files there are, by suffix.
+        beside: Those other files, no more than `MOST_NAMED`.
     """
 
     files: dict[str, list[str]] = field(default_factory=dict)
     datasets: list[str] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
+    beside: list[str] = field(default_factory=list)
 
 
 def detect(path: Path) -> str:
@@ -131,10 +134,12 @@ def contents(path: Path, *, into_whole: bool = False) -> Contents:
             continue
         for name in sorted(files):
             layout = named_layout(name)
+            relative = (place / name).relative_to(path).as_posix()
             if layout is None:
                 found.others[Path(name).suffix or "no suffix"] += 1
+                if len(found.beside) < MOST_NAMED:
+                    found.beside.append(relative)
             else:
-                relative = (place / name).relative_to(path).as_posix()
                 found.files.setdefault(layout, []).append(relative)
     return found
 

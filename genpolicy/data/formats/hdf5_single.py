@@ -4,66 +4,133 @@ HDF5 can read other files: external links, external storage and virtual data set
 the file, and a filter can load a library. All of them are refused before anything is read.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.data.formats.leaves import MAXIMUM_TEXT, leaves
-from genpolicy.data.formats.source import Also, Column, refuse
+from genpolicy.data.formats.leaves import (
+    MAXIMUM_DEPTH,
+    MAXIMUM_OBJECT,
+    MAXIMUM_TEXT,
+    WIDEST,
+    text_of,
+)
+from genpolicy.data.formats.source import TOO_LARGE, Also, Column, is_large, refuse
 
 OBSERVATIONS = "obs"
+# The observations of one row later.
+AGAIN = ("next_obs",)
+MOST_MEMBERS = 512
+COUNT = "num_samples"
+MARKUP = "<"  # the XML of a simulator's model
+NO_VALUE = "no plain value of a row or of the demonstration"
+MODEL = "the model of a simulator"
 # Filters of the library itself: deflate, shuffle, fletcher32, szip, nbit, scale-offset, lzf.
 FILTERS = (1, 2, 3, 4, 5, 6, 32000)
 REWRITE = "Write the file again with plain, internal data sets (h5repack)."
 
 
-def read_single(
-    demo: Any, read: dict[str, NDArray[Any]], columns: Sequence[Column], also: Also
-) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Data sets of one axis beside those read: by row, and one value for the whole.
+@dataclass(frozen=True)
+class Beside:
+    """What was recorded of a demonstration beside what the contract reads, by name.
+
+    Attributes:
+        by_row: Values by row.
+        single: Values of the demonstration, as texts that `leaves` takes apart.
+        left: What is not read, and why.
+    """
+
+    by_row: dict[str, NDArray[Any]]
+    single: dict[str, str]
+    left: dict[str, str]
+
+
+def read_single(demo: Any, read: Mapping[str, NDArray[Any]], also: Also) -> Beside:
+    """Data sets beside those read, by row or one value for the whole, and attributes of groups.
 
     What is no plain data set of this file is passed over: nothing depends on it.
 
     Args:
         demo: Group of the demonstration.
         read: The columns that were read; all of one length.
-        columns: What the file was described with.
         also: Says which to read.
-
-    Returns:
-        Values by row, and values of the demonstration as text, by name.
     """
+    found = Beside({}, {}, {})
     rows = len(next(iter(read.values()), ()))
-    wide = {column.name for column in columns if column.width is not None}
-    by_row: dict[str, NDArray[Any]] = {}
-    single: dict[str, str] = {}
-    for name, data in _plain(demo):
-        if name in read or name in wide or not also(Column(name, None)):
+    for name, data in _members(demo):
+        if name in read:
             continue
-        if data.ndim == 1 and len(data) == rows and rows > 1:
-            by_row[name] = _texts(data, MAXIMUM_TEXT) if _is_text(data) else np.asarray(data[...])
-        elif data.size == 1:
-            values = _texts(data) if _is_text(data) else np.asarray(data[...])
-            single |= leaves(name, str(values.reshape(-1)[0]))
-    return by_row, single
+        if isinstance(data, h5py.Group):
+            single, left = attributes_of(data)
+            found.single.update({f"{name}/{key}": text for key, text in single.items()})
+            found.left.update({f"{name}/{key}": why for key, why in left.items()})
+        else:
+            _read_one(name, data, rows, also, found)
+    return found
 
 
-def _plain(demo: Any) -> Iterator[tuple[str, Any]]:
-    """Data sets of at most one axis, numbers or text, of the demonstration and what it saw."""
-    groups = [("", demo)]
-    link = demo.get(OBSERVATIONS, getlink=True) if OBSERVATIONS in set(demo) else None
-    if isinstance(link, h5py.HardLink) and isinstance(demo[OBSERVATIONS], h5py.Group):
-        groups.append((f"{OBSERVATIONS}/", demo[OBSERVATIONS]))
-    for prefix, group in groups:
+def attributes_of(group: Any) -> tuple[dict[str, str], dict[str, str]]:
+    """Attributes of a group as texts, and those that are left out and why; no model's markup."""
+    found: dict[str, str] = {}
+    left: dict[str, str] = {}
+    for name in sorted(group.attrs):
+        value = group.attrs[name]
+        text = None if np.size(value) > WIDEST else text_of(value)
+        if name == COUNT:
+            continue
+        if text is None or len(text) > MAXIMUM_OBJECT:
+            left[str(name)] = NO_VALUE
+        elif len(text) > MAXIMUM_TEXT and text.lstrip().startswith(MARKUP):
+            left[str(name)] = MODEL
+        else:
+            found[str(name)] = text
+    return found, left
+
+
+def _read_one(name: str, data: Any, rows: int, also: Also, found: Beside) -> None:
+    """One data set: by row, one value, a few values, or nothing that could be asked."""
+    width = int(data.shape[1]) if data.ndim == 2 else None
+    plain = data.ndim <= 1 or (data.ndim == 2 and not _is_text(data))
+    column = Column(name, width)
+    by_row = plain and data.ndim > 0 and rows > 1 and len(data) == rows
+    if not _is_own(data) or not plain or (not by_row and not 0 < data.size <= WIDEST):
+        # What was seen and is no column is named where the file is described.
+        if not name.startswith(f"{OBSERVATIONS}/") and isinstance(data, h5py.Dataset):
+            found.left[name] = NO_VALUE
+    elif by_row and is_large(column, rows):
+        found.left[name] = TOO_LARGE
+    elif by_row and also(column):
+        values = _texts(data, MAXIMUM_TEXT) if _is_text(data) else np.asarray(data[...])
+        found.by_row[name] = values
+    elif not by_row and also(Column(name, None)):
+        values = (_texts(data) if _is_text(data) else np.asarray(data[...])).reshape(-1)
+        text = text_of(values[0] if len(values) == 1 else values)
+        if text is not None:
+            found.single[name] = text
+
+
+def _members(demo: Any) -> Iterator[tuple[str, Any]]:
+    """Data sets and groups of a demonstration by their path, by hard links only, not too deep."""
+    held: list[tuple[str, Any, int]] = [("", demo, 0)]
+    seen = 0
+    while held:
+        prefix, group, depth = held.pop(0)
         for name in sorted(group):
+            seen += 1
+            if seen > MOST_MEMBERS:
+                return
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue
-            data = group[name]
-            if isinstance(data, h5py.Dataset) and data.ndim <= 1 and _is_own(data):
-                yield f"{prefix}{name}", data
+            path, member = f"{prefix}{name}", group[name]
+            if isinstance(member, h5py.Dataset):
+                yield path, member
+            elif isinstance(member, h5py.Group) and depth < MAXIMUM_DEPTH and path not in AGAIN:
+                yield path, member
+                held.append((f"{path}/", member, depth + 1))
 
 
 def _is_own(data: Any) -> bool:

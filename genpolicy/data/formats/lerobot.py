@@ -15,8 +15,17 @@ from numpy.typing import NDArray
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
-from genpolicy.data.formats.lerobot_meta import data_files, read_episodes, read_info, read_tasks
-from genpolicy.data.formats.segments import episodes_of, find_segments
+from genpolicy.data.formats.leaves import holds_several
+from genpolicy.data.formats.lerobot_meta import (
+    data_files,
+    is_of_layout,
+    read_episodes,
+    read_info,
+    read_tasks,
+)
+from genpolicy.data.formats.reading import Reading, reading
+from genpolicy.data.formats.segments import episodes_of, find_segments, longest
+from genpolicy.data.formats.sidecars import of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     Also,
@@ -33,7 +42,9 @@ from genpolicy.errors import BadInputError
 EPISODE, FRAME, INDEX, TASK = "episode_index", "frame_index", "index", "task_index"
 TIME, SUCCESS = "timestamp", "next.success"
 SWITCHING_TASK = "instruction"
-OWN = ("episode_index", "length", "tasks", "task")
+OWN = ("episode_index", "length", "stats")
+TASKS = "tasks"
+Asked = tuple[Sequence[str], Also]
 
 
 class LeRobotDataset:
@@ -55,11 +66,15 @@ class LeRobotDataset:
         self._by_file = self._info.version.startswith("v2")
         self._tasks = read_tasks(path, self._info)
         self._listed, notes = read_episodes(path, self._info)
+        self._drop_tasks()
         if not self._files:
             refuse(str(path), "without a data file", "files named by its template")
         first = self._files[0][1]
         with open_table(first, label=self._label(first), hashed=False) as table:
             stored = dict(table.columns)
+            strange = [name for name in table.skipped if name not in self._info.skipped]
+        if strange:
+            notes.append(f"Not read: {', '.join(strange)} (neither numbers nor text).")
         self.columns = self._columns(stored, notes)
         self.labels = labels_of(
             self.columns,
@@ -69,7 +84,9 @@ class LeRobotDataset:
             task="task" if self._tasks else None,
         )
         self.count = len(self._files) if self._by_file else (self._info.episodes or None)
-        self.notes = (*notes, *self._disagreements())
+        data = {self._label(file) for _, file in self._files}
+        sidecars = of_folder(path, lambda name: name in data or is_of_layout(name))
+        self.notes = (*notes, *self._disagreements(), *sidecars)
 
     def episodes(
         self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
@@ -82,8 +99,7 @@ class LeRobotDataset:
             try:
                 with open_table(path, label=label) as table:
                     reader = self._one if self._by_file else self._many
-                    names = self._stored(table, wanted, also)
-                    done += yield from reader(table, number, names, done, seen)
+                    done += yield from reader(table, number, (wanted, also), done, seen)
             except BadInputError as error:
                 yield refusal_of(label, error)
                 seen.add(number)
@@ -92,22 +108,24 @@ class LeRobotDataset:
             yield Refusal(label, label, f"{label} is listed in the metadata and has no data.")
 
     def _one(
-        self, table: Table, number: int, names: Sequence[str], done: int, seen: set[int]
+        self, table: Table, number: int, asked: Asked, done: int, seen: set[int]
     ) -> Generator[RawEpisode | Refusal, None, int]:
         """A file of one episode."""
         seen.add(number)
         if table.rows > MAXIMUM_EPISODE_ROWS:
             refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
-        columns = read_columns(table, names)
-        yield self._raw(table, number, columns, table.label, done)
+        read = reading(table, self._needed(table, asked[0]), asked[1], rows=table.rows)
+        columns = read_columns(table, read.names, read.beside)
+        yield self._raw((table, read), number, columns, table.label, done)
         return table.rows
 
     def _many(
-        self, table: Table, number: int, names: Sequence[str], done: int, seen: set[int]
+        self, table: Table, number: int, asked: Asked, done: int, seen: set[int]
     ) -> Generator[RawEpisode | Refusal, None, int]:
         """A file of several episodes, one after the other."""
         segments = find_segments(table, EPISODE)
-        for segment, columns in episodes_of(table, segments, names):
+        read = reading(table, self._needed(table, asked[0]), asked[1], rows=longest(segments))
+        for segment, columns in episodes_of(table, segments, read.names, read.beside):
             if isinstance(columns, Refusal):
                 yield columns
                 seen |= {int(segment.key)} if segment.key.isdigit() else set()
@@ -117,20 +135,26 @@ class LeRobotDataset:
                 if not segment.key.isdigit() or int(segment.key) in seen:
                     refuse(f"{label}: {EPISODE}", segment.key, "a number that no file before had")
                 seen.add(int(segment.key))
-                yield self._raw(table, int(segment.key), columns, label, done + segment.start)
+                found = (table, read), int(segment.key), columns, label
+                yield self._raw(*found, done + segment.start)
             except BadInputError as error:
                 yield refusal_of(label, error)
         return table.rows
 
     def _raw(
         self,
-        table: Table,
+        source: tuple[Table, Reading],
         number: int,
         columns: dict[str, NDArray[Any]],
         label: str,
         first_row: int,
     ) -> RawEpisode:
-        declared = {c.name: c for c in self.columns if not c.per_episode and c.width is not None}
+        table, read = source
+        declared = {
+            c.name: c
+            for c in self.columns
+            if not c.per_episode and c.width is not None and c.name not in read.beside
+        }
         check_columns(columns, label=label, known=table.columns | declared)
         _check_indices(columns, number, label)
         attributes = {
@@ -146,7 +170,7 @@ class LeRobotDataset:
         if SUCCESS in columns:
             # It becomes true in the row that reaches the goal, and only there.
             attributes["success"] = str(bool(np.any(columns[SUCCESS]))).lower()
-        return RawEpisode(label, table.digest, columns, attributes, first_row)
+        return RawEpisode(label, table.digest, columns, attributes, first_row, read.left)
 
     def _texts(self, numbers: NDArray[Any], where: str) -> NDArray[Any]:
         """The instruction of each row; a change to one that nobody described is damage (n,)."""
@@ -156,13 +180,18 @@ class LeRobotDataset:
         texts = [self._tasks.get(int(number), "not_recorded") for number in known]
         return np.array(texts, dtype=object)[place.reshape(-1)]
 
-    def _stored(self, table: Table, wanted: Sequence[str], also: Also) -> list[str]:
-        """Columns to read: those wanted and the indices, which are always checked."""
+    def _drop_tasks(self) -> None:
+        """Several texts of an episode are kept; its one instruction is what its rows say."""
+        texts = [said[TASKS] for said in self._listed.values() if TASKS in said]
+        if self._tasks and not any(holds_several(text) for text in texts):
+            for said in self._listed.values():
+                said.pop(TASKS, None)
+
+    def _needed(self, table: Table, wanted: Sequence[str]) -> list[str]:
+        """Columns to read in any case: those wanted and the indices, which are always checked."""
         per_episode = {column.name for column in self.columns if column.per_episode}
         names = [name for name in wanted if name not in per_episode or name in table.columns]
-        names += [n for n in (EPISODE, FRAME, INDEX, TASK, SUCCESS) if n in table.columns]
-        names += [c.name for c in table.columns.values() if also(c)]
-        return list(dict.fromkeys(names))
+        return names + [n for n in (EPISODE, FRAME, INDEX, TASK, SUCCESS) if n in table.columns]
 
     def _columns(self, stored: dict[str, Column], notes: list[str]) -> tuple[Column, ...]:
         """What is stored, with the names that the description gives; what it lacks is a note."""

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from genpolicy.data.formats.leaves import text_of
 from genpolicy.data.formats.source import Column, refuse
-from genpolicy.data.formats.tables import open_table, read_columns
+from genpolicy.data.formats.tables import documents, is_plain, open_table, read_columns
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import parse_json, read_json
 
@@ -21,6 +22,13 @@ EPISODES_V2 = "meta/episodes.jsonl"
 EPISODES_V3 = "meta/episodes"
 TASKS_V2 = "meta/tasks.jsonl"
 TASKS_V3 = "meta/tasks.parquet"
+# What the layout itself says of an episode: statistics, and where its rows and pictures lie.
+OWN = ("stats/", "data/", "meta/", "videos/")
+FILES = (
+    *(INFO, EPISODES_V2, TASKS_V2, TASKS_V3, "meta/stats.json", "meta/episodes_stats.jsonl"),
+    *("meta/modality.json", "meta/subtasks.parquet"),
+)
+FOLDERS = (f"{EPISODES_V3}/", "videos/", "images/")
 DEFAULT_PATH = {
     "v2": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
     "v3": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
@@ -138,6 +146,11 @@ def data_files(root: Path, info: Info) -> list[tuple[int, Path]]:
     return [(place, path) for place, (_, _, path) in enumerate(sorted(found))]
 
 
+def is_of_layout(name: str) -> bool:
+    """Whether a file is one that the layout has beside its data, by its relative POSIX path."""
+    return name in FILES or name.startswith(FOLDERS)
+
+
 def read_lines(path: Path) -> Iterator[dict[str, Any]]:
     """The documents of a `.jsonl` file; none where the file is absent.
 
@@ -176,41 +189,45 @@ def read_tasks(root: Path, info: Info) -> dict[int, str]:
 
 
 def read_episodes(root: Path, info: Info) -> tuple[dict[int, dict[str, str]], list[str]]:
-    """What the metadata say of each episode: scalar values by name, as text; and notes.
+    """What the metadata say of each episode, by name, as texts that `leaves` takes apart; notes.
 
     An unreadable list is a note: the data decide, not their description.
     """
     result: dict[int, dict[str, str]] = {}
+    strange: set[str] = set()
+    notes: list[str] = []
     try:
-        for document in _episode_documents(root, info):
+        for document in _episode_documents(root, info, strange):
             number = document.get("episode_index")
             if isinstance(number, int) and not isinstance(number, bool):
-                result[number] = {
-                    key: str(value)
-                    for key, value in document.items()
-                    if isinstance(value, str | int | float | bool) and "/" not in key
-                }
+                said = {key: text_of(value) for key, value in document.items()}
+                result[number] = {key: text for key, text in said.items() if text is not None}
     except BadInputError as error:
-        return result, [f"The list of episodes could not be read: {error}"]
-    return result, []
+        notes.append(f"The list of episodes could not be read: {error}")
+    if strange:
+        names = ", ".join(sorted(strange))
+        notes.append(f"Not read from the list of episodes: {names} (no plain values).")
+    return result, notes
 
 
-def _episode_documents(root: Path, info: Info) -> Iterator[dict[str, Any]]:
+def _episode_documents(root: Path, info: Info, strange: set[str]) -> Iterator[dict[str, Any]]:
+    """What is said of each episode, without what the layout itself writes there."""
     if info.version.startswith("v2"):
-        yield from read_lines(root / EPISODES_V2)
+        for document in read_lines(root / EPISODES_V2):
+            yield {name: value for name, value in document.items() if not _is_own(name)}
         return
     for path in sorted((root / EPISODES_V3).rglob("*.parquet")):
         label = path.relative_to(root).as_posix()
         with open_table(path, label=label) as table:
-            # Statistics and offsets have a slash in their name; there are hundreds of them.
-            names = [n for n, c in table.columns.items() if c.width is None and "/" not in n]
-            values = read_columns(table, names)
-            for row in range(table.rows):
-                yield {name: column[row] for name, column in _plain(values).items()}
+            # Statistics and offsets stand in hundreds of columns.
+            names = [name for name in table.file.schema_arrow.names if not _is_own(name)]
+            plain = [name for name in names if is_plain(table.file.schema_arrow.field(name).type)]
+            strange |= set(names) - set(plain)
+            yield from documents(table, plain)
 
 
-def _plain(values: dict[str, Any]) -> dict[str, list[Any]]:
-    return {name: column.tolist() for name, column in values.items()}
+def _is_own(name: str) -> bool:
+    return name.startswith(OWN)
 
 
 def _is_task(document: dict[str, Any]) -> bool:

@@ -1,5 +1,6 @@
 """Plain Parquet: a long table with a column of episodes, or one file per episode, or a folder."""
 
+import contextlib
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
@@ -12,7 +13,10 @@ from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import files_of
-from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments
+from genpolicy.data.formats.episode_column import episode_column, restarted
+from genpolicy.data.formats.reading import Reading, reading
+from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments, longest
+from genpolicy.data.formats.sidecars import among, of_file, of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     Also,
@@ -48,10 +52,15 @@ class ParquetFiles:
             refuse(str(path), "without a .parquet file", "a file, or a folder of them")
         self._table = self._first()
         self.columns: tuple[Column, ...] = tuple(self._table.columns.values())
-        self.labels = labels_of(self.columns)
+        named = labels_of(self.columns)
+        found = episode_column(self._tables, self._table.columns, named)
+        self.labels = named.model_copy(update={"episode": found.name})
+        self._restart = found.restart
         skipped = ", ".join(self._table.skipped)
-        self.notes = (f"Not read: {skipped} (neither numbers nor text).",) if skipped else ()
-        self.count = None if self.labels.episode is not None else len(self._files)
+        unread = (f"Not read: {skipped} (neither numbers nor text).",) if skipped else ()
+        self.notes = (*unread, *found.notes, *self._sidecars(path))
+        several = self.labels.episode is not None or self._restart is not None
+        self.count = None if several else len(self._files)
 
     def episodes(
         self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
@@ -65,6 +74,21 @@ class ParquetFiles:
                     done += yield from self._of(table, wanted, episode, also, done)
             except BadInputError as error:
                 yield refusal_of(label, error)
+
+    def _tables(self) -> Iterator[Table]:
+        """Every readable file, described."""
+        for path in self._files:
+            label = path.relative_to(self._root).as_posix()
+            with (
+                contextlib.suppress(BadInputError),
+                open_table(path, label=label, hashed=False) as table,
+            ):
+                yield table
+
+    def _sidecars(self, path: Path) -> tuple[str, ...]:
+        if not path.is_dir():
+            return of_file(path)
+        return of_folder(path, among({f.relative_to(path).as_posix() for f in self._files}))
 
     def _first(self) -> Table:
         """The file that describes all, whatever the files are called.
@@ -90,37 +114,47 @@ class ParquetFiles:
     def _of(
         self, table: Table, wanted: Sequence[str], episode: str | None, also: Also, done: int
     ) -> Generator[RawEpisode | Refusal, None, int]:
-        # What is read beside the contract may differ from file to file.
-        more = [c.name for c in table.columns.values() if c.name not in wanted and also(c)]
-        known = table.columns | {c.name: c for c in self.columns if c.name not in more}
-        names = list(dict.fromkeys([*wanted, *more]))
-        if episode is None:
+        # Where rows begin anew was looked at under the column that the names proposed.
+        restart = self._restart if episode == self.labels.episode else None
+        if episode is None and restart is None:
             if table.rows > MAXIMUM_EPISODE_ROWS:
                 refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
-            columns = read_columns(table, names)
-            check_columns(columns, label=table.label, known=known)
-            yield RawEpisode(table.label, table.digest, columns, first_row=done)
+            read = reading(table, wanted, also, rows=table.rows)
+            columns = read_columns(table, read.names, read.beside)
+            check_columns(columns, label=table.label, known=self._known(table, read))
+            yield RawEpisode(table.label, table.digest, columns, first_row=done, left=read.left)
             return table.rows
-        segments = find_segments(table, episode)
-        for segment, read in episodes_of(table, segments, names):
-            if isinstance(read, Refusal):
-                yield read
+        segments = (
+            find_segments(table, episode or "")
+            if restart is None
+            else restarted(table, episode, restart)
+        )
+        read = reading(table, wanted, also, rows=longest(segments))
+        known = self._known(table, read)
+        for segment, found in episodes_of(table, segments, read.names, read.beside):
+            if isinstance(found, Refusal):
+                yield found
                 continue
             label = episode_label(table.label, segment.key)
             try:
-                check_columns(read, label=label, known=known)
+                check_columns(found, label=label, known=known)
             except BadInputError as error:
                 yield refusal_of(label, error)
                 continue
-            uuid = UUID_COLUMN in episode.lower()
+            uuid = restart is None and UUID_COLUMN in (episode or "").lower()
             yield RawEpisode(
                 label=label,
                 digest=table.digest,
-                columns=read,
+                columns=found,
                 attributes={"episode_uuid": segment.key} if uuid else {},
                 first_row=done + segment.start,
+                left=read.left,
             )
         return table.rows
+
+    def _known(self, table: Table, read: Reading) -> dict[str, Column]:
+        """What each column should be; what is read beside may differ from file to file."""
+        return table.columns | {c.name: c for c in self.columns if c.name not in read.beside}
 
 
 def _names(path: Path) -> tuple[str, ...]:

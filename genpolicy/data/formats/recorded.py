@@ -1,17 +1,22 @@
 """Which columns of the recordings may be the reason, and their values by episode.
 
-Everything scalar that the contract uses for nothing else, and that holds for a while: a value that
+Everything that the contract uses for nothing else, and that holds for a while: a value that
 changes from row to row is a signal, and what counts rows or judges the episode is no reason.
+Whatever is left out is noted by its name.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.data.formats.contract import ImportContract, selectors
-from genpolicy.data.formats.leaves import leaves
+from genpolicy.data.formats.interventions import Interventions
+from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, WIDEST, leaves, vector_of
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.units import tokens
+from genpolicy.data.formats.vectors import Vectors, starts_of
 from genpolicy.data.variables import Recorded, Runs, runs_of, varying
 
 # What counts rows, episodes or files, and what comes of an episode instead of before it.
@@ -39,6 +44,7 @@ SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+UNEVEN = "no numbers in an episode, or rows of different widths"
 
 
 def may_be_reason(name: str) -> bool:
@@ -59,60 +65,133 @@ class Reasons:
     def __init__(self, contract: ImportContract) -> None:
         """Nothing that the contract reads is gathered twice."""
         texts = [text for channel in contract.channels for text in channel.columns]
-        texts += contract.action.columns
-        read = {selector.column for selector in selectors(texts, where="contract")}
-        self._used = read | set(contract.labels.named().values())
+        seen = selectors(texts, where="contract")
+        done = {item.column for item in selectors(contract.action.columns, where="contract")}
+        read = {item.column for item in seen} | done
+        self._elements = {(item.column, item.element) for item in seen}
+        # What is left out of an action is still done, not a reason for it.
+        self._partly = {item.column for item in seen} - done
+        self._interventions = Interventions(contract.labels.is_intervention)
+        # No layer of the audit looks at that label, so its column is asked as any other.
+        labels = contract.labels.model_copy(update={"is_intervention": None}).named()
+        self._session = labels.pop("episode", None)
+        self._used = read | set(labels.values())
         self._runs: dict[str, dict[str, Runs]] = {}
+        self._vectors = Vectors()
         self._episodes = 0
         self._flickering: dict[str, int] = {}
+        self._judging: set[str] = set()
+        self._many: set[str] = set()
+        self._left: dict[str, set[str]] = {}
 
     def wants(self, column: Column) -> bool:
         """Whether the values of a column are to be read."""
-        plain = column.width is None and column.name not in self._used
-        return plain and may_be_reason(column.name)
+        name = column.name
+        if name in self._used or not may_be_reason(name):
+            return False
+        return column.width is None or column.width <= WIDEST
 
     def add(self, raw: RawEpisode, uuid: str) -> None:
         """Remember what was recorded of an accepted episode."""
         self._episodes += 1
-        for name, values in raw.columns.items():
-            if values.ndim != 1 or not len(values) or not self.wants(Column(name, None)):
+        for name, why in raw.left.items():
+            if name not in self._used and may_be_reason(name):
+                self._left.setdefault(why, set()).add(name)
+        for name, values in self._with_elements(raw.columns):
+            width = values.shape[1] if values.ndim == 2 else None
+            if values.ndim > 2 or not len(values) or not self.wants(Column(name, width)):
                 continue
-            if isinstance(values[0], str) and np.all(values == values[0]):
+            if width is not None:
+                self._add_wide(name, values, uuid)
+            elif isinstance(values[0], str) and np.all(values == values[0]):
                 self._keep(name, values[0], uuid)
-                continue
-            runs = runs_of(values)
-            if len(runs.rows) > max(2, len(values) // SHORTEST_RUN):
-                self._flickering[name] = self._flickering.get(name, 0) + 1
             else:
-                self._runs.setdefault(name, {})[uuid] = runs
+                self._add_runs(name, values, uuid)
         for name, text in raw.attributes.items():
             if name not in raw.columns and self.wants(Column(name, None)):
                 self._keep(name, text, uuid)
+        for name, share in self._interventions.add(raw).items():
+            self._runs.setdefault(name, {})[uuid] = Runs((0,), (share,))
+
+    def _with_elements(
+        self, columns: Mapping[str, NDArray[Any]]
+    ) -> Iterator[tuple[str, NDArray[Any]]]:
+        """The columns, and each number of a wide one of which the contract reads some others."""
+        for name, values in columns.items():
+            yield name, values
+            if name in self._partly and values.ndim == 2 and values.shape[1] <= WIDEST:
+                for k in range(values.shape[1]):
+                    if (name, k) not in self._elements:
+                        yield f"{name}[{k}]", values[:, k]
+
+    def _add_runs(self, name: str, values: NDArray[Any], uuid: str) -> None:
+        runs = runs_of(values)
+        if self._holds(name, len(runs.rows), len(values)):
+            self._runs.setdefault(name, {})[uuid] = runs
+
+    def _add_wide(self, name: str, values: NDArray[Any], uuid: str) -> None:
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            self._left.setdefault(UNEVEN, set()).add(name)
+            return
+        starts = starts_of(values)
+        if self._holds(name, len(starts), len(values)):
+            rows = [tuple(row) for row in values[starts].astype(np.float64).tolist()]
+            self._vectors.add(name, uuid, starts.tolist(), rows)
+
+    def _holds(self, name: str, runs: int, rows: int) -> bool:
+        """Whether values hold for a while in an episode; else it is counted."""
+        flickers = runs > max(2, rows // SHORTEST_RUN)
+        self._flickering[name] = self._flickering.get(name, 0) + flickers
+        return not flickers
 
     def _keep(self, name: str, text: str, uuid: str) -> None:
         """What holds for an episode; part by part, where it was written as one JSON object."""
-        for part, said in leaves(name, text).items():
-            if part == name or self.wants(Column(part, None)):
+        parts = leaves(name, text)
+        if len(parts) == MAXIMUM_LEAVES:
+            self._many.add(name)
+        for part, said in parts.items():
+            if part != name and not self.wants(Column(part, None)):
+                self._judging.add(part)
+            elif (numbers := vector_of(said)) is not None:
+                self._vectors.add(part, uuid, [0], [numbers])
+            else:
                 self._runs.setdefault(part, {})[uuid] = Runs((0,), (said,))
 
     def recorded(self) -> Recorded:
         """What varies; a value that is the same everywhere tells nothing."""
-        kept = {name: runs for name, runs in self._runs.items() if not self._is_signal(name)}
+        found = self._vectors.recorded()
+        for name, runs in self._runs.items():
+            # A text in some episodes and a list of numbers in others is one column of texts.
+            found[name] = found.get(name, {}) | runs
+        kept = {name: runs for name, runs in found.items() if not self._is_signal(name)}
+        if self._session in kept and self._names_each(kept[self._session]):
+            del kept[self._session]
         return varying(kept, self._episodes)
 
     def notes(self, columns: Sequence[Column]) -> list[str]:
         """What was recorded and is not looked at as a reason, a sentence each."""
         notes: list[str] = []
-        wide = [c.name for c in columns if c.width is not None and c.name not in self._used]
-        if wide:
-            notes.append(f"Not looked at as a reason, several numbers wide: {_listed(wide)}.")
+        unread = [c for c in columns if c.name not in self._used and c.name != self._session]
+        wide = [c.name for c in unread if c.width is not None and c.width > WIDEST]
         signals = [name for name in sorted(self._flickering) if self._is_signal(name)]
-        if signals:
-            notes.append(f"Not looked at as a reason, changes row by row: {_listed(signals)}.")
-        return notes
+        judging = [c.name for c in unread if not may_be_reason(c.name)]
+        for names, why in (
+            (wide, f"more than {WIDEST} numbers wide"),
+            (signals, "changes row by row"),
+            ([*judging, *sorted(self._judging - {*judging})], "counts rows or judges the episode"),
+            (sorted(self._many), f"all but the first {MAXIMUM_LEAVES} of its parts"),
+            *((sorted(names), why) for why, names in sorted(self._left.items())),
+        ):
+            if names:
+                notes.append(f"Not looked at as a reason, {why}: {_listed(names)}.")
+        return notes + self._interventions.notes()
 
     def _is_signal(self, name: str) -> bool:
         return self._flickering.get(name, 0) > FLICKERING_SHARE * self._episodes
+
+    def _names_each(self, by_episode: Mapping[str, Runs]) -> bool:
+        """Whether every episode has a value of its own."""
+        return len({runs.values for runs in by_episode.values()}) == self._episodes
 
 
 def _listed(names: Sequence[str]) -> str:

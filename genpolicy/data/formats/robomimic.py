@@ -23,8 +23,16 @@ from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import only_hdf5
-from genpolicy.data.formats.hdf5_single import REWRITE, check_storage, member, read_single
+from genpolicy.data.formats.hdf5_single import (
+    REWRITE,
+    attributes_of,
+    check_storage,
+    member,
+    read_single,
+)
 from genpolicy.data.formats.leaves import MAXIMUM_TEXT, leaves
+from genpolicy.data.formats.masks import read_masks, say
+from genpolicy.data.formats.sidecars import among, of_file, of_folder
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     MAXIMUM_VALUE_BYTES,
@@ -42,7 +50,6 @@ DATA, OBSERVATIONS, MASK = "data", "obs", "mask"
 ACTIONS = "actions"
 PER_ROW = ("actions", "rewards", "dones")
 MAXIMUM_ATTRIBUTE = 1 << 20
-MARKUP = "<"  # the XML of a simulator's model
 HASH_BYTES = 1 << 20
 READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
 
@@ -52,8 +59,12 @@ class RobomimicFile:
 
     known: ImportContract | None = None
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, sidecars: Sequence[str] = ()) -> None:
         """Describe the first readable demonstration and list all.
+
+        Args:
+            path: The file.
+            sidecars: The notes on files beside it.
 
         Raises:
             BadInputError: Not HDF5, without demonstrations, or with links to other places.
@@ -68,7 +79,7 @@ class RobomimicFile:
             if not self._demos:
                 refuse(f"{self.name}: {DATA}", "empty", "demonstrations demo_0, demo_1, …")
             self.rate_hz, self._delta = _environment(data, notes)
-            self._operators = _operators(file, self.name, set(self._demos), notes)
+            self._operators, self._masks = _masks(file, self.name, self._demos, notes)
             columns, attributes, skipped = self._describe(data)
         if skipped:
             notes.append(f"Not read: {', '.join(skipped)} (pictures, or no plain numbers).")
@@ -77,10 +88,11 @@ class RobomimicFile:
         if self._operators:
             notes.append("The operator was taken from the file's masks.")
             attributes.add("operator")
+        attributes |= {mask for said in self._masks.values() for mask in said}
         extra = [Column(n, None, "text", per_episode=True) for n in sorted(attributes)]
         self.columns: tuple[Column, ...] = (*columns, *extra)
         self.labels = labels_of(self.columns, episode=None, frame=None)
-        self.notes = tuple(notes)
+        self.notes = (*notes, *sidecars)
         self.count = len(self._demos)
 
     def episodes(
@@ -99,11 +111,12 @@ class RobomimicFile:
                 try:
                     raw = self._read(data, demo, names, label, (digest, done))
                     group = _group(data, demo, label)
-                    columns, single = read_single(group, raw.columns, self.columns, also)
+                    beside = read_single(group, raw.columns, also)
                     raw = replace(
                         raw,
-                        columns=raw.columns | columns,
-                        attributes=raw.attributes | single,
+                        columns=raw.columns | beside.by_row,
+                        attributes=raw.attributes | beside.single,
+                        left=attributes_of(group)[1] | beside.left,
                     )
                     done += len(raw.columns[ACTIONS])
                     yield raw
@@ -120,6 +133,7 @@ class RobomimicFile:
         columns = {name: _values(group, name, label) for name in names}
         check_columns(columns, label=label, known={c.name: c for c in self.columns})
         attributes = _attributes(group)
+        attributes |= self._masks.get(demo, {})
         if demo in self._operators:
             attributes["operator"] = self._operators[demo]
         return RawEpisode(label, digest, columns, attributes, first_row=done)
@@ -137,7 +151,10 @@ class RobomimicFile:
 
 def open_source(path: Path) -> RobomimicFile:
     """A robomimic file, or the only one of a folder, described; see `RobomimicFile`."""
-    return RobomimicFile(only_hdf5(path))
+    file = only_hdf5(path)
+    if not path.is_dir() or file == path:
+        return RobomimicFile(file, of_file(file))
+    return RobomimicFile(file, of_folder(path, among({file.relative_to(path).as_posix()})))
 
 
 @contextmanager
@@ -231,19 +248,21 @@ def _columns(demo: Any, where: str) -> tuple[list[Column], set[str], list[str]]:
 
 
 def _attributes(group: Any) -> dict[str, str]:
-    """Scalar attributes as text; of a long one its parts, and no model of a simulator."""
+    """Attributes as text; of a long one its parts, and no model of a simulator."""
     result: dict[str, str] = {}
-    for name in sorted(group.attrs):
-        value = group.attrs[name]
-        if isinstance(value, bytes):
-            value = value.decode("utf-8", errors="replace")
-        if isinstance(value, str | bool | int | float | np.number | np.bool_):
-            text = str(value)
-            if len(text) <= MAXIMUM_TEXT and name != "num_samples":
-                result[str(name)] = text
-            elif name != "num_samples" and not text.lstrip().startswith(MARKUP):
-                result |= leaves(str(name), text)
+    for name, text in attributes_of(group)[0].items():
+        result |= {name: text} if len(text) <= MAXIMUM_TEXT else leaves(name, text)
     return result
+
+
+def _masks(
+    file: Any, where: str, demos: Sequence[str], notes: list[str]
+) -> tuple[dict[str, str], dict[str, dict[str, str]]]:
+    """Operator, and what else the masks of the file say, by demonstration."""
+    if MASK not in set(file):
+        return {}, {}
+    members = read_masks(_group(file, MASK, where), f"{where}: {MASK}", notes)
+    return say(members, demos, notes)
 
 
 def _environment(data: Any, notes: list[str]) -> tuple[float | None, bool]:
@@ -260,27 +279,6 @@ def _environment(data: Any, notes: list[str]) -> tuple[float | None, bool]:
         return None, False
     valid = isinstance(rate, int | float) and not isinstance(rate, bool) and 0 < rate <= 100_000
     return (float(rate) if valid else None), delta
-
-
-def _operators(file: Any, where: str, demos: set[str], notes: list[str]) -> dict[str, str]:
-    """Operator by demonstration, where masks named after operators share all of them out."""
-    if MASK not in set(file):
-        return {}
-    masks = _group(file, MASK, where)
-    result: dict[str, str] = {}
-    unknown: set[str] = set()
-    for name in sorted(masks):
-        data = member(masks, name, f"{where}: {MASK}")
-        if not isinstance(data, h5py.Dataset) or data.ndim != 1 or data.dtype.kind not in "SO":
-            continue
-        check_storage(data, f"{where}: {MASK}/{name}")
-        members = {v.decode("utf-8", "replace") for v in data[...] if isinstance(v, bytes)}
-        unknown |= members - demos
-        if re.fullmatch(r".*operator[_ ]?\w*", name):
-            result |= dict.fromkeys(sorted(members & demos), name)
-    if unknown:
-        notes.append(f"Masks name {len(unknown)} demonstrations that are not there.")
-    return result if set(result) == demos else {}
 
 
 def _natural(name: str) -> tuple[int, str]:

@@ -23,7 +23,7 @@ FROM_ONE_CLOCK = 2
 # Of whole numbers: so few are labels, and so many rows on average make no flicker.
 MOST_LABELS, LONGEST_FLICKER = 12, 8
 HANDS = {"gripper", "hand", "finger", "jaw", "grasp", "contact", "contacts"}
-SETTLED = ("task", "object", "operator", "calibration_epoch")
+SETTLED = ("task", "object", "operator", "calibration_epoch", "is_recovery")
 SWITCHING_SHARE = 0.25
 
 

@@ -5,7 +5,7 @@ more than one episode and one batch in memory.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,16 +62,29 @@ def find_segments(table: Table, column: str) -> list[Segment]:
             refuse(f"{table.label}: {column}", found, "a table sorted by episode")
     stops = [*edges[1:], done]
     return [
-        Segment(_key(key), start, stop) for key, start, stop in zip(keys, edges, stops, strict=True)
+        Segment(key_of(key), start, stop)
+        for key, start, stop in zip(keys, edges, stops, strict=True)
     ]
 
 
+def longest(segments: Sequence[Segment]) -> int:
+    """Rows of the longest episode."""
+    return max((segment.stop - segment.start for segment in segments), default=0)
+
+
 def episodes_of(
-    table: Table, segments: Sequence[Segment], wanted: Sequence[str]
+    table: Table, segments: Sequence[Segment], wanted: Sequence[str], beside: Collection[str] = ()
 ) -> Iterator[tuple[Segment, dict[str, NDArray[Any]] | Refusal]]:
-    """Each episode with its columns; one in two places, too long or unreadable is a refusal."""
+    """Each episode with its columns; one in two places, too long or unreadable is a refusal.
+
+    Args:
+        table: The file.
+        segments: The episodes, in order.
+        wanted: Names of columns.
+        beside: Those of them that nothing depends on.
+    """
     places = Counter(segment.key for segment in segments)
-    reader = batches(table, wanted)
+    reader = batches(table, wanted, beside)
     rows = _Rows(reader)
     refused: set[str] = set()
     broken: Refusal | None = None
@@ -150,7 +163,8 @@ def _drop(rows: _Rows, segment: Segment) -> None:
         return
 
 
-def _key(value: Any) -> str:
+def key_of(value: Any) -> str:
+    """An identifier as text, whole numbers without a point."""
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return str(value)

@@ -18,6 +18,9 @@ from genpolicy.errors import BadInputError, ContractError
 MAXIMUM_EPISODE_ROWS = 1_000_000
 MAXIMUM_SOURCE_ROWS = 50_000_000
 MAXIMUM_VALUE_BYTES = 2 << 30
+# What nothing depends on is read beside the rest where an episode of it is no larger.
+MAXIMUM_BESIDE_BYTES = 128 << 20
+TOO_LARGE = f"an episode of it is larger than {MAXIMUM_BESIDE_BYTES >> 20} MiB"
 ACTION = "Correct the recording, or leave this episode out."
 
 Progress = Callable[[int, int | None], None]
@@ -55,6 +58,7 @@ class RawEpisode:
         attributes: Values that hold for the whole episode; `episode_uuid` among them if it has
             one.
         first_row: Rows of the recordings before it, where no clock tells when it began.
+        left: What was recorded of it and not read, by name, and why.
     """
 
     label: str
@@ -62,6 +66,7 @@ class RawEpisode:
     columns: dict[str, NDArray[Any]]
     attributes: dict[str, str] = field(default_factory=dict)
     first_row: int = 0
+    left: dict[str, str] = field(default_factory=dict)
 
 
 Also = Callable[[Column], bool]
@@ -122,6 +127,11 @@ class Source(Protocol):
             also: Says which other columns to read where they are there.
         """
         ...
+
+
+def is_large(column: Column, rows: int) -> bool:
+    """Whether so many rows of a column are too many to read where nothing depends on it."""
+    return column.width is not None and 8 * rows * column.width > MAXIMUM_BESIDE_BYTES
 
 
 def refusal_of(label: str, error: BadInputError) -> Refusal:

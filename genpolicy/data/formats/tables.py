@@ -3,7 +3,7 @@
 import io
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
@@ -83,8 +83,15 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
         yield Table(label, digest, file, columns, skipped)
 
 
-def batches(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
+def batches(
+    table: Table, wanted: Sequence[str], beside: Collection[str] = ()
+) -> Iterator[dict[str, NDArray[Any]]]:
     """The wanted columns, some thousand rows at a time, in the order of the file.
+
+    Args:
+        table: The file.
+        wanted: Names of columns.
+        beside: Those of them that nothing depends on: NaN where the rows of one differ in width.
 
     Raises:
         BadInputError: A column is missing, its rows differ in width, or a page is damaged.
@@ -100,7 +107,9 @@ def batches(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, NDArray[A
                 batch_size=BATCH_ROWS, columns=list(wanted), row_groups=[group]
             ):
                 yield {
-                    name: _array(batch.column(name), table.columns[name], table.label, done)
+                    name: _missing(batch.column(name), table.columns[name])
+                    if name in beside and not _is_even(batch.column(name), table.columns[name])
+                    else _array(batch.column(name), table.columns[name], table.label, done)
                     for name in wanted
                 }
                 done += batch.num_rows
@@ -108,17 +117,44 @@ def batches(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, NDArray[A
         raise _unreadable(table.label, error) from error
 
 
-def read_columns(table: Table, wanted: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """The wanted columns of the whole file.
+def read_columns(
+    table: Table, wanted: Sequence[str], beside: Collection[str] = ()
+) -> dict[str, NDArray[Any]]:
+    """The wanted columns of the whole file; see `batches`.
 
     Raises:
         BadInputError: As `batches`.
     """
-    parts = list(batches(table, wanted))
+    parts = list(batches(table, wanted, beside))
     return {
         name: np.concatenate([part[name] for part in parts]) if parts else np.zeros(0)
         for name in wanted
     }
+
+
+def documents(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """The rows one by one, with lists and mappings as they are.
+
+    Raises:
+        BadInputError: A page is damaged.
+    """
+    try:
+        for batch in table.file.iter_batches(batch_size=BATCH_ROWS, columns=list(wanted)):
+            yield from batch.to_pylist()
+    except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
+        raise _unreadable(table.label, error) from error
+
+
+def is_plain(kind: pa.DataType) -> bool:
+    """Whether values are numbers, texts, truth values, moments, or lists and mappings of those."""
+    if pa.types.is_dictionary(kind) or pa.types.is_list(kind) or pa.types.is_large_list(kind):
+        return is_plain(kind.value_type)
+    if pa.types.is_fixed_size_list(kind):
+        return is_plain(kind.value_type)
+    if pa.types.is_struct(kind):
+        return all(is_plain(kind.field(k).type) for k in range(kind.num_fields))
+    text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_null(kind)
+    return text or _is_number(kind) or pa.types.is_date(kind) or pa.types.is_time(kind)
 
 
 def _digest(stream: io.BufferedReader, label: str) -> str:
@@ -229,6 +265,19 @@ def _array(values: pa.Array, column: Column, label: str, done: int) -> NDArray[A
             found = f"{lengths[row]} numbers wide"
             refuse(f"{where}, row {done + row}", found, f"{column.width}, as in the first row")
     return _scalars(flat).reshape(len(values), column.width)
+
+
+def _is_even(values: pa.Array, column: Column) -> bool:
+    """Whether all rows of a column are of its width."""
+    if column.width is None or pa.types.is_fixed_size_list(values.type):
+        return column.width is None or values.null_count == 0
+    return not values.null_count and bool(
+        (np.asarray(values.value_lengths()) == column.width).all()
+    )
+
+
+def _missing(values: pa.Array, column: Column) -> NDArray[Any]:
+    return np.full((len(values), column.width or 0), np.nan)
 
 
 def _scalars(values: pa.Array) -> NDArray[Any]:

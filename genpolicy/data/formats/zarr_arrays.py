@@ -5,7 +5,8 @@ anything is decoded.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,11 +14,13 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
+from genpolicy.data.formats.leaves import text_of
 from genpolicy.data.formats.source import Column
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
 from genpolicy.integrity.documents import read_json
 
 MAXIMUM_ARRAY_BYTES = 1 << 30
+BLOCK_ROWS = 4096
 NUMERIC_TYPES = ("<f4", "<f8", "<i4", "<i8", "<i2", "<u2", "<u4", "|i1", "|u1", "|b1")
 # Version 3 names the same types in words; byte order is a codec there.
 IN_WORDS = {
@@ -52,19 +55,19 @@ def arrays_below(folder: Path) -> dict[str, Path]:
 
 
 def attributes_of(folder: Path) -> dict[str, str]:
-    """Single values that a group carries beside its arrays."""
+    """What a group carries beside its arrays, as texts that `leaves` takes apart."""
+    said = {str(name): text_of(value) for name, value in document_of(folder).items()}
+    return {name: text for name, text in said.items() if text is not None}
+
+
+def document_of(folder: Path) -> dict[str, Any]:
+    """The attributes of a group, as they were written."""
     document: Any = {}
     if (folder / ".zattrs").is_file():
         document = read_json(folder / ".zattrs")
     elif (folder / "zarr.json").is_file():
         document = read_json(folder / "zarr.json").get("attributes", {})
-    if not isinstance(document, dict):
-        return {}
-    return {
-        str(name): str(value)
-        for name, value in document.items()
-        if isinstance(value, (str, int, float, bool))
-    }
+    return document if isinstance(document, dict) else {}
 
 
 def column_of(name: str, folder: Path) -> Column | None:
@@ -112,20 +115,76 @@ def check_head(head: Mapping[str, Any], place: str) -> None:
         refuse(place, f"{size} bytes", f"1 to {MAXIMUM_ARRAY_BYTES}")
 
 
-def read_array(folder: Path) -> NDArray[Any]:
-    """A whole array, its description checked before it is decoded."""
+def read_array(folder: Path, *, filled: bool = False) -> NDArray[Any]:
+    """A whole array, its description checked before it is decoded.
+
+    Args:
+        folder: The array.
+        filled: Whether a chunk that is not there holds the fill value instead of being lost.
+    """
+    with _decoding(folder):
+        return np.asarray(_open(folder, filled=filled)[:])
+
+
+def has_gaps(folder: Path) -> bool:
+    """Whether chunks of an array are not there: lost, or of the fill value alone."""
+    head = head_of(folder)
+    with _decoding(folder):
+        array = zarr.open_array(str(folder), mode="r", zarr_format=head["zarr_format"])
+        return bool(array.nchunks_initialized != array.nchunks)
+
+
+def slices(folder: Path, ends: Sequence[int]) -> Iterator[NDArray[Any]]:
+    """The rows of each episode, decoded block by block: the whole array is never in memory.
+
+    A chunk that is not there holds the fill value, as zarr writes flags that are all zero.
+
+    Args:
+        folder: The array.
+        ends: Row behind each episode, rising.
+    """
+    with _decoding(folder):
+        array = _open(folder, filled=True)
+        step = int(array.chunks[0]) * max(1, BLOCK_ROWS // int(array.chunks[0]))
+        held: NDArray[Any] = np.asarray(array[:0])
+        first = 0
+        for end in ends:
+            parts, stop = [held], first + len(held)
+            while stop < end:
+                parts.append(np.asarray(array[stop : stop + step]))
+                stop += step
+            joined = np.concatenate(parts)
+            yield joined[: end - first]
+            held, first = joined[end - first :], end
+
+
+def largest_block(folder: Path) -> int:
+    """Bytes of what is decoded at once of an array of two axes."""
+    head = head_of(folder)
+    with _decoding(folder):
+        array = zarr.open_array(str(folder), mode="r", zarr_format=head["zarr_format"])
+        rows = max(int(array.chunks[0]), BLOCK_ROWS)
+        return rows * math.prod(array.shape[1:]) * int(array.dtype.itemsize)
+
+
+def _open(folder: Path, *, filled: bool) -> zarr.Array[Any]:
     place, head = str(folder), head_of(folder)
     check_head(head, place)
+    array = zarr.open_array(place, mode="r", zarr_format=head["zarr_format"])
+    if not filled and array.nchunks_initialized != array.nchunks:
+        refuse(place, f"{array.nchunks_initialized} chunks", f"all {array.nchunks} of them")
+    return array
+
+
+@contextmanager
+def _decoding(folder: Path) -> Iterator[None]:
     try:
-        array = zarr.open_array(place, mode="r", zarr_format=head["zarr_format"])
-        if array.nchunks_initialized != array.nchunks:
-            refuse(place, f"{array.nchunks_initialized} chunks", f"all {array.nchunks} of them")
-        return np.asarray(array[:])
+        yield
     except BadInputError:
         raise
     except Exception as error:  # decoders raise whatever they like on changed bytes
         raise IntegrityError(
-            where=place,
+            where=str(folder),
             found=f"not decodable ({' '.join(str(error).split())[:120]})",
             expected="whole chunks",
             action=ACTION,

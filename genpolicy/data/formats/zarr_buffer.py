@@ -7,10 +7,8 @@ an array has such a name, and never guessed.
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
@@ -20,7 +18,8 @@ from genpolicy.data.formats.contract import (
     Frozen,
     ImportContract,
 )
-from genpolicy.data.formats.source import Also, Column, RawEpisode, nothing
+from genpolicy.data.formats.sidecars import of_zarr
+from genpolicy.data.formats.source import Also, RawEpisode, nothing
 from genpolicy.data.formats.zarr_arrays import (
     arrays_below,
     check_head,
@@ -29,6 +28,7 @@ from genpolicy.data.formats.zarr_arrays import (
     read_array,
     refuse,
 )
+from genpolicy.data.formats.zarr_beside import Beside, described, lists_of
 from genpolicy.data.formats.zarr_groups import EpisodeGroups, groups_of
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
@@ -100,14 +100,13 @@ class ReplayBuffer:
         check_head(head_of(ends), str(ends))
         inside = arrays_below(path / "data" if (path / "data").is_dir() else path)
         self._places = {name: folder for name, folder in inside.items() if folder != ends}
-        described = {name: column_of(name, folder) for name, folder in self._places.items()}
-        columns = [column for column in described.values() if column is not None]
-        skipped = [name for name, column in described.items() if column is None]
+        fields = {name: column_of(name, folder) for name, folder in self._places.items()}
+        columns = [column for column in fields.values() if column is not None]
         beside = arrays_below(path / "meta") if (path / "meta").is_dir() else {}
-        self._described = {
-            name: folder
+        others = {
+            name if name not in self._places else f"meta/{name}": folder
             for name, folder in beside.items()
-            if folder != ends and name not in self._places and _is_single(folder)
+            if folder not in (ends, *self._places.values())
         }
         # Described before it is hashed, hashed before it is decoded.
         self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
@@ -119,16 +118,10 @@ class ReplayBuffer:
         rows = int(self._ends[-1])
         fitting = [c for c in columns if _rows_of(self._places[c.name]) == rows]
         self.columns = tuple(fitting or columns)  # where none fits, that is the error
-        others = [c.name for c in columns if c not in self.columns]
-        self._single_places = {
-            c.name: self._places[c.name] for c in columns if c.width is None
-        } | self._described
+        self._beside = described(self._places | others, rows=rows, episodes=len(self._ends))
+        self._listed = lists_of(path, len(self._ends))
         self.labels = labels_of(self.columns, episode=None, frame=None)
-        notes = [f"Not read: {', '.join(skipped)} (no plain columns)."] if skipped else []
-        strange = [name for name in others if _rows_of(self._places[name]) != len(self._ends)]
-        if strange:
-            notes.append(f"Not read: {', '.join(strange)} (of another length than the episodes).")
-        self.notes = tuple(notes)
+        self.notes = (*self._beside.notes(), *of_zarr(path))
         self.count = len(self._ends)
 
     @property
@@ -151,29 +144,23 @@ class ReplayBuffer:
             if len(values) != rows:
                 place = f"{self.path}/meta/episode_ends"
                 refuse(place, f"{rows} at its end", f"{len(values)}, the rows of {name}")
-        single = self._single(wanted, also)
-        arrays |= {name: values for name, values in single.items() if len(values) == rows}
-        by_episode = {n: v for n, v in single.items() if len(v) == len(self._ends) != rows}
-        for number, end in enumerate(self._ends.tolist()):
-            start = int(self._ends[number - 1]) if number else 0
+        ends = self._ends.tolist()
+        beside = Beside(self._beside, ends, read=wanted, also=also)
+        for number, end in enumerate(ends):
+            start = ends[number - 1] if number else 0
+            columns = {name: values[start:end] for name, values in arrays.items()}
+            listed = {name: texts[number] for name, texts in self._listed.items()}
             yield RawEpisode(
                 label=f"{self.name}#episode_{number:06d}",
                 digest=self.digest,
-                columns={name: values[start:end] for name, values in arrays.items()},
-                attributes={name: str(values[number]) for name, values in by_episode.items()},
+                columns=columns | beside.next(),
+                attributes=listed | beside.of_episode(number),
                 first_row=start,
+                left=dict(beside.left),
             )
 
     def _place(self, name: str) -> Path:
         return self._places.get(name, self.path / "data" / name)
-
-    def _single(self, wanted: Sequence[str], also: Also) -> dict[str, NDArray[Any]]:
-        """Arrays of one axis beside those wanted, of the rows or of the episodes."""
-        return {
-            name: read_array(place)
-            for name, place in sorted(self._single_places.items())
-            if name not in wanted and also(Column(name, None))
-        }
 
 
 def ends_of(path: Path) -> tuple[Path, bool] | None:
@@ -195,11 +182,6 @@ def open_source(path: Path) -> ReplayBuffer | EpisodeGroups:
     """
     groups = None if ends_of(path) else groups_of(path)
     return ReplayBuffer(path) if groups is None else EpisodeGroups(path, groups)
-
-
-def _is_single(folder: Path) -> bool:
-    column = column_of(folder.name, folder)
-    return column is not None and column.width is None
 
 
 def _rows_of(folder: Path) -> int:

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.leaves import WIDEST, text_of
 from genpolicy.data.formats.source import (
+    TOO_LARGE,
     Also,
     Column,
     RawEpisode,
     check_columns,
+    is_large,
     nothing,
     refusal_of,
 )
@@ -32,6 +35,7 @@ from genpolicy.data.formats.zarr_arrays import (
     read_array,
     refuse,
 )
+from genpolicy.data.formats.zarr_beside import NOT_READABLE, OTHER_LENGTH
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
@@ -59,25 +63,27 @@ class EpisodeGroups:
         first = arrays_below(self._groups[0])
         rows = _usual_rows(first)
         columns: list[Column] = []
-        single: set[str] = set()
+        self._single: set[str] = set()
         skipped: list[str] = []
         for name, folder in first.items():
             shape = head_of(folder)["shape"]
             column = column_of(name, folder)
-            if column is None and shape != []:
+            few = len(shape) <= 1 and (shape or [1])[0] <= WIDEST
+            if few and shape != [rows]:
+                self._single.add(name)
+            elif column is None or shape[0] != rows:
                 skipped.append(name)
-            elif column is None or (column.width is None and shape[0] == 1 != rows):
-                single.add(name)
             else:
                 columns.append(column)
         if not columns:
             refuse(str(self._groups[0]), "without arrays of rows", "the arrays of an episode")
-        self._single = single
-        names = sorted(single | set(attributes_of(self._groups[0])))
+        names = sorted(self._single | set(_said_by(self._groups[0])))
         extra = [Column(name, None, "text", per_episode=True) for name in names]
         self.columns = (*columns, *extra)
         self.labels = labels_of(self.columns, episode=None, frame=None)
-        self.notes = (f"Not read: {', '.join(skipped)} (no plain columns).",) if skipped else ()
+        self.notes = (
+            (f"Not read: {', '.join(skipped)} (no columns of its rows).",) if skipped else ()
+        )
         self.count = len(self._groups)
         self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
 
@@ -86,28 +92,78 @@ class EpisodeGroups:
     ) -> Iterator[RawEpisode | Refusal]:
         """Each group with the wanted arrays, or why it could not be read."""
         known = {column.name: column for column in self.columns}
-        more = [
-            column.name
-            for column in self.columns
-            if not column.per_episode and column.width is None and also(column)
-        ]
-        names = [name for name in dict.fromkeys([*wanted, *more]) if not known[name].per_episode]
+        names = [name for name in dict.fromkeys(wanted) if not known[name].per_episode]
+        more = [c for c in self.columns if not c.per_episode and c.name not in names and also(c)]
         done = 0
         for group in self._groups:
             label = f"{self.name}#{group.relative_to(self.path).as_posix()}"
             try:
                 columns = {name: _read(group, name, label) for name in names}
                 check_columns(columns, label=label, known=known)
-                attributes = attributes_of(group) | {
-                    name: str(_read(group, name, label).reshape(-1)[0])
-                    for name in sorted(self._single)
-                    if name in arrays_below(group)
-                }
             except BadInputError as error:
                 yield refusal_of(label, error)
                 continue
-            yield RawEpisode(label, self.digest, columns, attributes, first_row=done)
-            done += len(next(iter(columns.values())))
+            rows = len(next(iter(columns.values())))
+            beside, left = _beside(group, more, rows, label)
+            single, missing = self._of(group, label)
+            yield RawEpisode(
+                label,
+                self.digest,
+                columns | beside,
+                _said_by(group) | single,
+                first_row=done,
+                left=left | missing,
+            )
+            done += rows
+
+    def _of(self, group: Path, label: str) -> tuple[dict[str, str], dict[str, str]]:
+        """Arrays of one value or a few that hold for the episode, and those not readable."""
+        found: dict[str, str] = {}
+        left: dict[str, str] = {}
+        there = arrays_below(group)
+        for name in sorted(self._single & set(there)):
+            try:
+                values = _read(group, name, label).reshape(-1)
+                text = text_of(values[0] if len(values) == 1 else values[:WIDEST])
+            except BadInputError:
+                text = None
+            if text is None:
+                left[name] = NOT_READABLE
+            else:
+                found[name] = text
+        return found, left
+
+
+def _beside(
+    group: Path, more: Sequence[Column], rows: int, label: str
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Columns that nothing depends on, and those that are left out and why."""
+    found: dict[str, NDArray[Any]] = {}
+    left: dict[str, str] = {}
+    for column in more:
+        if is_large(column, rows):
+            left[column.name] = TOO_LARGE
+            continue
+        try:
+            values = _read(group, column.name, label)
+        except BadInputError:
+            left[column.name] = NOT_READABLE
+            continue
+        if values.shape == ((rows,) if column.width is None else (rows, column.width)):
+            found[column.name] = values
+        else:
+            left[column.name] = OTHER_LENGTH
+    return found, left
+
+
+def _said_by(group: Path) -> dict[str, str]:
+    """Attributes of an episode's group and of the groups in it."""
+    found = attributes_of(group)
+    for folder in sorted(group.iterdir()):
+        if folder.is_dir() and is_group(folder):
+            said = attributes_of(folder)
+            found |= {f"{folder.name}/{name}": text for name, text in said.items()}
+    return found
 
 
 def groups_of(path: Path) -> list[Path] | None:

@@ -290,10 +290,23 @@ def test_what_a_script_is_in_is_a_label_also_where_it_is_called_a_state(layouts,
 
 def test_what_is_not_kept_is_noted():
     reasons = Reasons(PUSHT)
-    wide = [Column("keypoint", 18), Column("state", 5), Column("latent", None)]
+    wide = [Column("picture", 3072), Column("state", 5), Column("latent", None)]
     assert [reasons.wants(column) for column in wide] == [False, False, True]
-    assert reasons.notes(wide) == ["Not looked at as a reason, several numbers wide: keypoint."]
-    raw = RawEpisode("a", "", {"latent": np.zeros(9)}, {"tool": "x", "reward": "1"})
+    assert reasons.notes([*wide, Column("next.reward", None)]) == [
+        "Not looked at as a reason, more than 1024 numbers wide: picture.",
+        "Not looked at as a reason, counts rows or judges the episode: next.reward.",
+    ]
+    said = json.dumps({"seen": {f"k{k}": k for k in range(300)}, "success": 1})
+    raw = RawEpisode(
+        "a", "", {"latent": np.zeros(9)}, {"tool": "x", "reward": "1", "meta": said},
+        left={"states": "too large", "rewards": "too large"},
+    )  # fmt: skip
     reasons.add(raw, "a")
-    reasons.add(replace(raw, attributes={"tool": "y"}), "b")
-    assert json.dumps(sorted(reasons.recorded())) == '["tool"]'
+    reasons.add(replace(raw, attributes={"tool": "y", "goal": '{"success": 1}'}), "b")
+    kept = reasons.recorded()
+    assert "tool" in kept and not {"latent", "reward", "goal.success"} & set(kept)
+    assert reasons.notes([]) == [
+        "Not looked at as a reason, counts rows or judges the episode: goal.success.",
+        "Not looked at as a reason, all but the first 256 of its parts: meta.",
+        "Not looked at as a reason, too large: states.",
+    ]

@@ -1,0 +1,68 @@
+"""Rows in which a person corrected a policy, as recorders of both flag them row by row.
+
+What a policy did and what a person did instead are two answers to one observation, and who acted
+is not seen in it: the flag is a reason like any other column, and so is how much was corrected.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.data.formats.source import RawEpisode, as_float
+
+TRUE, FALSE = ("true", "1", "1.0", "yes"), ("false", "0", "0.0", "no")
+SHARE = "share of the rows"
+
+
+class Interventions:
+    """Counts what a column of flags says, episode by episode."""
+
+    def __init__(self, column: str | None) -> None:
+        """Nothing yet.
+
+        Args:
+            column: The column; None where the recordings have none.
+        """
+        self._column = column
+        self._rows = self._corrected = self._episodes = self._with = 0
+        self._by_row = False
+
+    def add(self, raw: RawEpisode) -> dict[str, float]:
+        """Count an episode.
+
+        Returns:
+            How much of it was corrected, by the name of that; nothing where it is not told by row.
+        """
+        flags = flags_of(raw.columns[self._column]) if self._column in raw.columns else None
+        if flags is None or self._column is None or not np.isfinite(flags).any():
+            return {}
+        known = flags[np.isfinite(flags)]
+        self._episodes += 1
+        self._rows += len(known)
+        self._corrected += int(known.sum())
+        self._with += bool(known.any())
+        self._by_row |= bool(known.min() != known.max())
+        return {f"{self._column} ({SHARE})": float(known.mean())}
+
+    def notes(self) -> list[str]:
+        """What the flags say, where they change inside episodes."""
+        if not self._by_row:
+            return []
+        return [
+            f"{self._column} says where a person corrected: {self._corrected / self._rows:.0%} of "
+            f"the rows, in {self._with} of {self._episodes} episodes. It is asked as a reason, "
+            "and so is its share of an episode."
+        ]
+
+
+def flags_of(values: NDArray[np.generic]) -> NDArray[np.float64] | None:
+    """0 or 1 by row, NaN where not recorded; None where a value is neither. Shape (n,)."""
+    if values.ndim != 1:
+        return None
+    if values.dtype.kind in "fiub":
+        numbers = as_float(values)
+        plain = np.isnan(numbers) | (numbers == 0.0) | (numbers == 1.0)
+        return numbers if bool(plain.all()) else None
+    texts = [str(value).strip().lower() for value in values.tolist()]
+    if not all(text in (*TRUE, *FALSE, "") for text in texts):
+        return None
+    return np.array([np.nan if text == "" else float(text in TRUE) for text in texts])
