@@ -4,9 +4,9 @@ It runs every time (`always_changed`): a task may be installed and recordings ma
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
-policy that is brought is not what its entry says or is not there, where a method or its sampler is none, where what
-may differ between methods never may, and where the machine has no such device: before anything
-trains.
+policy that is brought is not what its entry says, or does not answer where it should run already,
+where a method or its sampler is none, where what may differ between methods never may, and where
+the machine has no such device: before anything trains.
 """
 
 import sys

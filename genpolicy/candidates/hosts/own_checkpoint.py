@@ -68,7 +68,7 @@ def require_as_declared(
     other = [one for one in _all(entry, policy) if one.found != one.expected]
     if other:
         _refuse(
-            f"the candidate {entry.name}", "declared as", other,
+            f"what the entry of {entry.name} says", other,
             "as `config.json` of its checkpoint says",
             "Correct the entry, or name the checkpoint that it describes.",
         )  # fmt: skip
@@ -82,8 +82,8 @@ def require_as_declared(
     other = [one for one in in_force if one.expected is not None and one.found != one.expected]
     if other:
         _refuse(
-            f"the checkpoint of the candidate {entry.name}", "trained on", other,
-            "which are in force here", "Bring one that was trained on what it is given here.",
+            f"what the checkpoint of {entry.name} was trained on", other,
+            "as in force here", "Bring one that was trained on what it is given here.",
         )  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def _actions(said: Output) -> Iterator[Said]:
     yield Said("action.gripper.closed", said.gripper.closed, 0.0)
     metres = said.gripper.open_m / (said.gripper.open - said.gripper.closed)
     if not math.isclose(metres, 1.0):
-        yield Said("a number 1 of action.gripper", f"{metres:.6g} m", "1 m")
+        yield Said("metres in a 1 of action.gripper", round(metres, 6), 1)
 
 
 def _columns(part: slice) -> range:
@@ -153,12 +153,10 @@ def _allowed(evaluations: int, sampler: SamplerConfig) -> bool:
     return allowed_evaluations(sampler).nearest(evaluations) == evaluations
 
 
-def _refuse(where: str, verb: str, other: Sequence[Said], rule: str, action: str) -> NoReturn:
+def _refuse(where: str, other: Sequence[Said], rule: str, action: str) -> NoReturn:
     found = "; ".join(f"{one.item} {_shown(one.found)}" for one in other)
     expected = "; ".join(f"{one.item} {_shown(one.expected)}" for one in other)
-    raise ConfigError(
-        where=where, found=f"{verb} {found}", expected=f"{expected}, {rule}", action=action
-    )
+    raise ConfigError(where=where, found=found, expected=f"{expected}, {rule}", action=action)
 
 
 def _shown(value: object) -> str:
