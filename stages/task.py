@@ -4,22 +4,24 @@ It runs every time (`always_changed`): a task may be installed and recordings ma
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
-policy that is brought is not what its entry says, where a method or its sampler is none, where what
-may differ between methods never may, where an exception of who was brought is over, and where the
-machine has no such device: before anything trains.
+policy that is brought is not what its entry says, or does not answer where it should run already,
+where an exception of one is over, where a method or its sampler is none, where what may differ
+between methods never may, and where the machine has no such device: before anything trains.
 """
 
+import sys
 from pathlib import Path
 
 from gates.exceptions import require_unmatched, unmatched_written, utc_today
 from gates.may_differ import require_possible
-from genpolicy.candidates.brought import BroughtSection, require_brought
-from genpolicy.candidates.hosts.loadable import require_loadable
+from genpolicy.candidates.brought import BroughtPolicy, BroughtSection, require_brought
+from genpolicy.candidates.hosts.loadable import require_answering, require_loadable
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
+from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.outputs import require_own_files
 from genpolicy.policies.determinism import require_device
 from genpolicy.policies.matched_training import PolicySettings
@@ -48,12 +50,33 @@ def work(params: Params) -> None:
         require_mapped(brought, task)
         for policy in brought:
             require_loadable(policy.entry, policy.path, task.observation)
+            _require_answering(policy)
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))
     with output_folder(ARTIFACTS / "task") as folder:
         write_bytes(folder / IDENTITY.file, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))
+
+
+def _require_answering(policy: BroughtPolicy) -> None:
+    """Before anything trains; who has been asked by Gate B may have ended since, and is told so."""
+    try:
+        require_answering(policy.entry, policy.path)
+    except ConfigError as error:
+        if not _asked(policy):
+            raise
+        print(f"task: {error}", file=sys.stderr)
+
+
+def _asked(policy: BroughtPolicy) -> bool:
+    """Whether the evidence of Gate B is of this entry."""
+    try:
+        found = read_json(ARTIFACTS / "reload" / "identity.json")
+    except BadInputError:
+        return False
+    own = found.get(policy.name) if isinstance(found, dict) else None
+    return isinstance(own, dict) and own.get("checkpoint") == policy.sha256
 
 
 def _required_methods(params: Params) -> list[str]:

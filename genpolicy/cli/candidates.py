@@ -15,7 +15,8 @@ from genpolicy.candidates.conformance.recorded_starts import (
     require_contract,
 )
 from genpolicy.candidates.conformance.stated import DatasetHashes, stated
-from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.hosts.kinds import TrainedEntry, read_entry
+from genpolicy.candidates.hosts.loadable import require_loadable
 from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.mapped import require_map
 from genpolicy.candidates.wire.entry import Entry, ServerEntry, verify_files
@@ -86,6 +87,8 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     )  # fmt: skip
     verify_files(entry, folder)
     require_map(entry, contract, checks.scene)
+    if isinstance(entry, TrainedEntry):  # all that differs is more than a server's last words
+        require_loadable(entry, path, contract)
     found = _found(as_server(entry, path, contract), folder, contract, asked)
     if as_json:
         print(json.dumps(found.as_json(), indent=2, sort_keys=True))

@@ -286,6 +286,9 @@ def serve_candidate(
         int | None,
         typer.Option(min=1, max=256, help="Of a program's operators; as the entry says if absent."),
     ] = None,
+    observation: Annotated[
+        str | None, typer.Option(help="Hash of the observation contract in force.")
+    ] = None,
     check: Annotated[bool, typer.Option("--check", help="Load it only, and end.")] = False,
 ) -> int:
     """Host the candidate of an entry.
@@ -297,8 +300,9 @@ def serve_candidate(
     from genpolicy.cli.serving import run_host
 
     return run_host(
-        entry, port=port, sha256=sha256, widths=width or [], threads=threads, only_loaded=check
-    )
+        entry, port=port, sha256=sha256, widths=width or [], threads=threads,
+        observation=observation, only_loaded=check,
+    )  # fmt: skip
 
 
 def check_candidate(

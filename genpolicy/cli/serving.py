@@ -27,7 +27,7 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None, device: str) -
 
 def run_host(
     path: Path, *, port: int, sha256: str | None, widths: list[str], threads: int | None,
-    only_loaded: bool = False,
+    observation: str | None = None, only_loaded: bool = False,
 ) -> int:  # fmt: skip
     """Serve what an entry names on this machine until an interrupt. Returns the exit code.
 
@@ -38,7 +38,7 @@ def run_host(
         BadInputError: The entry or a file of it is missing, wrong, or another one.
     """
     known = dict(_width(said) for said in widths)
-    served = hosted(path, sha256=sha256, widths=known, threads=threads)
+    served = hosted(path, sha256=sha256, widths=known, threads=threads, observation=observation)
     if only_loaded:
         return 0
     return _listen(served, str(path), port)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from genpolicy.candidates.described import architecture_of
 from genpolicy.candidates.hosts import onnx_library
 from genpolicy.cli.main import main
 from genpolicy.evidence.split import split_sha256
@@ -78,6 +79,17 @@ def entry_of(place, kind):
     return path
 
 
+def true_of(place):
+    """What the checkpoint knows of itself, in place of the numbers of the docs."""
+    policy = load_policy(place / "flow" / "seed_0")
+    config, steps = policy.checkpoint.config, policy.sampler.steps
+    return {
+        "training_seed": config.training_seed, "architecture": architecture_of(config),
+        "parameters": config.parameters["total"], "sampler_steps": steps, "evaluations": steps,
+        "batch_rows": policy.sampler.batch_rows,
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("kind", ["trained", "torch", "onnx", "scripted"])
 def test_the_entries_of_the_docs_are_checked(place, dataset, capsys, kind):
     path = entry_of(place, kind)
@@ -85,7 +97,7 @@ def test_the_entries_of_the_docs_are_checked(place, dataset, capsys, kind):
     manifest = dataset / "manifest.json"
     split = split_sha256(json.loads(manifest.read_bytes()))
     text = text.replace("@manifest@", sha256_file(manifest)).replace("@split@", split)
-    declared = yaml.safe_load(text)["declared"]
+    declared = yaml.safe_load(text)["declared"] | (true_of(place) if kind == "trained" else {})
     path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), "declared": declared}))
     words = ["check-candidate", str(path), "--dataset", str(dataset), "--deadline", "20", "--json"]
     assert main(words) == 0
@@ -137,3 +149,16 @@ def test_a_child_that_refuses_says_why(place, dataset, capsys):
     path.write_text(yaml.safe_dump({**entry, "function": "planner:nothing"}))
     assert main(["check-candidate", str(path), "--dataset", str(dataset)]) == 2
     assert "without the function nothing" in capsys.readouterr().err
+
+
+def test_a_checkpoint_that_is_declared_as_another_is_refused_with_both_sides(
+    place, dataset, capsys
+):
+    """Wrong before: the finding `declared` held for it."""
+    path = entry_of(place, "trained")
+    [text] = re.findall(r"```yaml\n(declared:.*?)```", DOCS, re.DOTALL)
+    text = re.sub('"@(manifest|split)@"', repr("0" * 64), text)
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), **yaml.safe_load(text)}))
+    assert main(["check-candidate", str(path), "--dataset", str(dataset)]) == 2
+    said = capsys.readouterr().err
+    assert "declared.parameters 812345" in said and "as `config.json` of its checkpoint" in said

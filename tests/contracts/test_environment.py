@@ -4,6 +4,7 @@ import configparser
 import importlib.metadata
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -120,3 +121,31 @@ def test_git_ignores_the_outputs_by_a_committed_rule() -> None:
     assert "/artifacts/" in (ROOT / ".gitignore").read_text().split()
     for name in (".dvc/config", ".dvc/.gitignore", ".dvcignore", ".ci/run"):
         assert (ROOT / name).is_file()
+
+
+@pytest.mark.parametrize("how", ["a path that is none", "one that does not run", "no such program"])
+def test_lerobot_s_environment_is_left_out_with_a_sentence_where_its_python_is_not(
+    tmp_path: Path, how: str
+) -> None:
+    """A shim of a version manager is a program by that name, and ends without running anything."""
+    make = shutil.which("make")
+    assert make is not None
+    words = [make, "-C", str(tmp_path), "-f", str(ROOT / "Makefile"), "lerobot"]
+    environment = dict(os.environ)
+    if how == "no such program":
+        (tmp_path / "bin").mkdir()
+        for tool in ("bash", "cat", "cut", "sha256sum", "python3.11"):
+            if found := shutil.which(tool):
+                (tmp_path / "bin" / tool).symlink_to(found)
+        environment["PATH"] = str(tmp_path / "bin")
+    else:
+        python = tmp_path / "python3.12"
+        if how == "one that does not run":
+            python.write_text("#!/bin/bash\nexit 127\n")
+            python.chmod(0o755)
+        words.append(f"PYTHON_LEROBOT={python}")
+    done = subprocess.run(words, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    said = "No Python 3.12 or 3.13 found, which LeRobot needs; skipped. Install one, or name it: "
+    assert said + "make PYTHON_LEROBOT=/path/to/python3.12 lerobot" in done.stdout
+    assert not (tmp_path / "build").exists()

@@ -1,11 +1,13 @@
 """Stage `task` refuses a candidate that is not what it should be, before anything trains."""
 
+import json
 import sys
 
 import pytest
 import yaml
 
 from gates.exceptions import utc_today
+from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.integrity.hashing import sha256_file, sha256_tree
 from tests.candidates.conftest import ENTRY
 
@@ -14,6 +16,8 @@ JOINTS = {
     "joints": {"columns": [0, 1, 2, 3, 4, 5], "unit": "rad"},
     "gripper": {"column": 6, "open": 1.0, "open_m": 1.0},
 }
+
+STARTED = {"address": None, "command": [sys.executable, "{port}"]}
 
 
 @pytest.fixture
@@ -25,7 +29,7 @@ def bring(workspace, edit):
 
     def write(**changes):
         digest = sha256_file(folder / "weights.bin")
-        entry = {**ENTRY, "files": {"weights.bin": digest}, **changes}
+        entry = {**ENTRY, **STARTED, "files": {"weights.bin": digest}, **changes}
         entry = {name: value for name, value in entry.items() if value is not None}
         (folder / "planted.yaml").write_text(yaml.safe_dump(entry))
         edit(workspace, lambda params: params["candidates"].update(planted="own/planted.yaml"))
@@ -41,9 +45,10 @@ def bring(workspace, edit):
         ({"files": {"weights.bin": "0" * 64}}, "or write the hash of what it is now into `files`"),
         ({"observation": {"state": {"channels": ["tcp_pose"]}}}, "'tcp_pose', expected a channel"),
         ({"action": JOINTS}, "6 joints, expected 7"),
-        ({"address": "ws://192.168.0.7:8000"}, "192.168.0.7, another machine"),
-        ({"address": "nonsense"}, "'nonsense', expected ws://HOST:PORT"),
-        ({"kind": "torch", "address": None, "program": "weights.bin", "stochastic": False,
+        ({"command": None, "address": "ws://192.168.0.7:8000"}, "192.168.0.7, another machine"),
+        ({"command": None, "address": "nonsense"}, "'nonsense', expected ws://HOST:PORT"),
+        ({"command": None, "address": "ws://127.0.0.1:1"}, "ws://127.0.0.1:1, where no policy"),
+        ({"kind": "torch", "command": None, "program": "weights.bin", "stochastic": False,
           "start_timeout_s": 300.0},
          "refused by its host"),
     ],
@@ -61,9 +66,9 @@ def test_a_candidate_is_looked_at_before_anything_trains(workspace, bring, stage
 
 
 def test_a_program_that_this_machine_does_not_have(workspace, bring, stage):
-    bring(address=None, command=[sys.executable, "{port}"])
+    bring()
     assert stage("task")[0] == 0
-    bring(address=None, command=["no_such_program", "{port}"])
+    bring(command=["no_such_program", "{port}"])
     code, said = stage("task")
     assert code == 2 and "no_such_program" in said
 
@@ -88,3 +93,15 @@ def test_an_exception_is_read_before_anything_trains(
     write(name, expires)
     code, said = stage("task")
     assert code == 2 and told in said, said
+
+
+def test_one_that_gate_b_has_asked_may_have_ended_since(workspace, bring, stage):
+    """Nothing trains for it; what asks it again finds it silent, and what does not goes on."""
+    bring(command=None, address="ws://127.0.0.1:1")
+    place = workspace / "artifacts" / "reload"
+    place.mkdir(parents=True)
+    own = read_entry(workspace / "own" / "planted.yaml").sha256
+    for checkpoint, code in ((own, 0), ("0" * 64, 2)):
+        (place / "identity.json").write_text(json.dumps({"planted": {"checkpoint": checkpoint}}))
+        found, said = stage("task")
+        assert (found, "where no policy answers" in said) == (code, True), said

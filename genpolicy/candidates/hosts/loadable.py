@@ -1,15 +1,19 @@
-"""Can a program or a checkpoint be loaded, and does it take what its entry says? Asked before all.
+"""Is a candidate there, and does it take and give what its entry says? Asked before all.
 
-What loads it is a child, as when it is judged: nothing of it, and no runtime of it, comes into the
-process that asks. It is loaded and not run.
+What loads a program or a checkpoint is a child, as when it is judged: nothing of it, and no runtime
+of it, comes into the process that asks. It is loaded and not run. Of a policy of LeRobot the config
+is read; a server that runs already is called, and asked nothing.
 """
 
 import subprocess
 from pathlib import Path
 
-from genpolicy.candidates.hosts.kinds import ProgramEntry, TrainedEntry
+from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
+from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
 from genpolicy.candidates.hosts.translation import loading_command
-from genpolicy.candidates.wire.entry import Entry
+from genpolicy.candidates.wire.connection import dial
+from genpolicy.candidates.wire.entry import Entry, ServerEntry
+from genpolicy.candidates.wire.faults import PolicyError
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
 
@@ -19,7 +23,7 @@ SILENT = "nothing"
 
 
 def require_loadable(entry: Entry, path: Path, contract: ObservationContract) -> None:
-    """Refuse a program or checkpoint that its host does not load, or of other names and shapes.
+    """Refuse what its host does not load, or what is of other names and shapes than its entry.
 
     A scripted function is not asked, since to load it is to run it; LeRobot's code and servers are
     started by nobody before they are judged.
@@ -30,8 +34,11 @@ def require_loadable(entry: Entry, path: Path, contract: ObservationContract) ->
         contract: The observation in force.
 
     Raises:
-        ConfigError: One that does not load, or not within its `start_timeout_s`.
+        ConfigError: One that does not load, or not within its `start_timeout_s`, or whose config
+            says otherwise.
     """
+    if isinstance(entry, LeRobotEntry):
+        require_shapes(entry, path.resolve().parent, contract)
     if not isinstance(entry, ProgramEntry | TrainedEntry):
         return
     try:
@@ -51,9 +58,30 @@ def require_loadable(entry: Entry, path: Path, contract: ObservationContract) ->
         raise ConfigError(
             where=f"{path}: the candidate {entry.name}",
             found=f"refused by its host ({_last(done.stderr)})",
-            expected=f"what a candidate of kind {entry.kind} is, of the inputs that its entry says",
+            expected=f"what a candidate of kind {entry.kind} is, as its entry says it",
             action="Correct the entry, or export it anew and write its hash into `files`.",
         )
+
+
+def require_answering(entry: Entry, path: Path) -> None:
+    """Refuse a server that runs already and does not answer the call; it is asked nothing.
+
+    It is called as when it is judged, with as much patience (`timeout_s`), and hung up on.
+
+    Raises:
+        ConfigError: Nobody answers at its `address`, or nobody who speaks the protocol.
+    """
+    if not isinstance(entry, ServerEntry) or entry.address is None:
+        return
+    try:
+        dial(entry.address, allowed=entry.allow_host, timeout_s=entry.timeout_s).close()
+    except PolicyError as fault:
+        raise ConfigError(
+            where=f"{path}: address",
+            found=f"{entry.address}, where no policy answers ({fault.seen})",
+            expected="a policy that runs already: nobody here starts one that names no `command`",
+            action="Start it and run this again, or name its `command`.",
+        ) from fault
 
 
 def _last(said: bytes) -> str:

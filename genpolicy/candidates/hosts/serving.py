@@ -16,12 +16,13 @@ from genpolicy.candidates.hosts.kinds import (
     read_entry,
 )
 from genpolicy.candidates.hosts.onnx_library import require_onnx
+from genpolicy.candidates.hosts.own_checkpoint import require_as_declared
 from genpolicy.candidates.hosts.ports import Program, check_ports
 from genpolicy.candidates.hosts.scripted import scripted_function
 from genpolicy.candidates.judged import loaded_on, sampling_by
 from genpolicy.candidates.wire.declared import Choice
 from genpolicy.candidates.wire.entry import Entry, read_file, verify_files
-from genpolicy.candidates.wire.served import ServedPolicy
+from genpolicy.candidates.wire.served import OBSERVATION, ServedPolicy
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.policies.policy import NetworkPolicy
 
@@ -29,8 +30,9 @@ HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
 
 
 def hosted(
-    path: Path, *, sha256: str | None, widths: Mapping[str, int], threads: int | None = None
-) -> Served:
+    path: Path, *, sha256: str | None, widths: Mapping[str, int], threads: int | None = None,
+    observation: str | None = None,
+) -> Served:  # fmt: skip
     """Who answers for an entry.
 
     Args:
@@ -38,9 +40,11 @@ def hosted(
         sha256: What the entry must say; None for whatever it says.
         widths: Numbers of each input, where they are known.
         threads: Of a program's operators, in place of those of the entry; None: those.
+        observation: SHA-256 of the observation contract in force, where it is known.
 
     Raises:
-        ConfigError: The entry is wrong, of a kind that is hosted elsewhere, or lacks a library.
+        ConfigError: The entry is wrong, of a kind that is hosted elsewhere, lacks a library, or
+            says of a checkpoint what the checkpoint does not say of itself.
         IntegrityError: The entry, or a file of it, is another one, or could run code.
         ContractError: The program takes or gives something else than the entry says.
     """
@@ -55,6 +59,7 @@ def hosted(
     verify_files(entry, folder)
     if isinstance(entry, TrainedEntry):
         policy = loaded_on(entry.device, folder / entry.checkpoint)
+        require_as_declared(entry, policy, width=widths.get(OBSERVATION), observation=observation)
         return ServedPolicy(policy, samplers=_chosen(policy, entry.samplers))
     if isinstance(entry, ProgramEntry):
         return _program(entry, folder, widths, threads or entry.threads)

@@ -4,8 +4,9 @@ import re
 import sys
 from pathlib import Path
 
-from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry
-from genpolicy.candidates.wire.channels import columns_of
+from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
+from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
+from genpolicy.candidates.wire.channels import columns_of, widths_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
@@ -36,14 +37,19 @@ def as_server(
         threads: Of a program's operators, in place of those of its entry; None: those.
 
     Raises:
-        ConfigError: Nothing on this machine runs it.
+        ConfigError: Nothing on this machine runs it, or a checkpoint or policy of LeRobot takes or
+            gives something else than it says.
         ContractError: It names what the observation does not have.
     """
     if isinstance(entry, ServerEntry):
         return entry
     entry.require_host()
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
-    command = _lerobot(entry) if isinstance(entry, LeRobotEntry) else _own(entry, path, contract)
+    if isinstance(entry, LeRobotEntry):
+        require_shapes(entry, path.resolve().parent, contract)
+        command = _lerobot(entry)
+    else:
+        command = _own(entry, path, contract)
     if threads is not None and isinstance(entry, ProgramEntry):
         command += ["--threads", str(threads)]
     return ServerEntry(**common, kind="server", command=command)
@@ -86,6 +92,7 @@ def loading_command(entry: Entry, path: Path, contract: ObservationContract) -> 
     """The command of a child that loads a candidate as its host does, and ends.
 
     Raises:
+        ConfigError: A checkpoint is not given the observation in its order.
         ContractError: It names what the observation does not have.
     """
     return [word for word in _own(entry, path, contract) if word not in ("--port", PORT)] + [
@@ -95,15 +102,30 @@ def loading_command(entry: Entry, path: Path, contract: ObservationContract) -> 
 
 def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
     """Our host. `-P`: what lies beside the entry is not found by an `import`."""
-    widths = {
-        name: len(columns_of(part.channels, contract, where=f"observation.{name}"))
-        for name, part in entry.observation.items()
-    }
+    if isinstance(entry, TrainedEntry):
+        _require_whole(entry, contract)
+    widths = widths_of(entry, contract)
+    known = ["--observation", contract.hash()] if isinstance(entry, TrainedEntry) else []
     return [
         sys.executable, "-P", "-c", HERE, str(ROOT), "serve-candidate", str(path.resolve()),
         "--port", PORT, "--sha256", entry.sha256,
         *(word for name, width in widths.items() for word in ("--width", f"{name}={width}")),
+        *known,
     ]  # fmt: skip
+
+
+def _require_whole(entry: TrainedEntry, contract: ObservationContract) -> None:
+    """Refuse an observation of a checkpoint that is not the vector of the contract, in order."""
+    [(name, given)] = entry.observation.items()
+    columns = columns_of(given.channels, contract, where=f"observation.{name}")
+    if columns.tolist() != list(range(contract.dim)):
+        raise ConfigError(
+            where=f"observation.{name}.channels of the candidate {entry.name}",
+            found=f"{', '.join(given.channels)} ({len(columns)} numbers)",
+            expected=f"{', '.join(contract.slices)} ({contract.dim} numbers), as a checkpoint is "
+            "given them",
+            action="Name all channels of the observation contract, in its order.",
+        )
 
 
 def _lerobot(entry: LeRobotEntry) -> list[str]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.wire.entry import Entry
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ContractError
 
@@ -33,3 +34,15 @@ def columns_of(names: Sequence[str], contract: ObservationContract, *, where: st
                 action="Name what the observation contract holds.",
             )
     return np.array(found, dtype=np.int64)
+
+
+def widths_of(entry: Entry, contract: ObservationContract) -> dict[str, int]:
+    """How many numbers each input of an entry has, by name.
+
+    Raises:
+        ContractError: It names what the observation does not have.
+    """
+    return {
+        name: len(columns_of(part.channels, contract, where=f"observation.{name}"))
+        for name, part in entry.observation.items()
+    }

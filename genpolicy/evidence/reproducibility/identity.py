@@ -5,6 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from genpolicy.candidates import selector, votes
+from genpolicy.candidates.described import (
+    architecture_of,
+    eta_of,
+    evaluations_of,
+    path_of,
+    precision_of,
+    tolerance_of,
+)
 from genpolicy.candidates.joining import REPLACE, JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, candidates_of
 from genpolicy.contract.horizons import HorizonConfig
@@ -14,16 +22,9 @@ from genpolicy.evidence.reproducibility.benchmark import DISCARDED
 from genpolicy.evidence.split import split_sha256
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
-from genpolicy.policies.checkpoint import CONFIG_FILE, CheckpointConfig
+from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.determinism import regime
-from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS
-from genpolicy.policies.distillation import GRID_STEPS, MULTISTEP
-from genpolicy.policies.evaluations import allowed_evaluations
-from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS, ODE_SAMPLERS
 from genpolicy.policies.policy import NetworkPolicy
-from genpolicy.policies.settings import SamplerConfig
-
-WITH_ETA = ("ddim",)
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,9 @@ def card_of(
     config, sampler = policy.checkpoint.config, policy.sampler
     horizons, runs = config.horizons, regime(policy.device)
     period_s = horizons.action_period_s
-    evaluations = allowed_evaluations(sampler)
     joining = deployment.joining.of(config.method, guided=policy.guided)
-    counts = dict.fromkeys((evaluations.least, evaluations.most))
     return IdentityCard(
-        architecture=_architecture(config),
+        architecture=architecture_of(config),
         parameters=config.parameters["total"],
         training_seeds=[str(each.checkpoint.config.training_seed) for each in policies],
         dataset=config.provenance.dataset_manifest_sha256,
@@ -93,13 +92,13 @@ def card_of(
         control_rate_hz=1.0 / period_s,
         invocation_rate_hz=1.0 / (horizons.execution_horizon * period_s),
         deadline_s=deployment.deadline_s,
-        path=_path(config, sampler),
+        path=path_of(config, sampler),
         sampler=sampler.name,
         sampler_steps=sampler.steps,
-        eta=sampler.eta if sampler.name in WITH_ETA else None,
-        tolerance=sampler.tolerance if sampler.name in ADAPTIVE_TABLEAUS else None,
-        evaluations=" to ".join(map(str, counts)),
-        precision=_precision(policy),
+        eta=eta_of(sampler),
+        tolerance=tolerance_of(sampler),
+        evaluations=evaluations_of(sampler),
+        precision=precision_of(policy),
         device=str(runs["device"]),
         threads=int(runs["threads"]),
         cpu_capability=str(runs["cpu_capability"]),
@@ -121,35 +120,3 @@ def rule_sha256(joining: JoiningSettings) -> str:
     if joining.rule == REPLACE:
         return own
     return sha256_bytes((own + sha256_file(Path(votes.__file__)) + joining.said()).encode())
-
-
-def _architecture(config: CheckpointConfig) -> str:
-    net = config.network
-    return (
-        f"{net.encoder} encoder of width {net.encoder_width} to {net.condition_dim}; {net.trunk} "
-        f"trunk of {net.trunk_blocks} blocks of width {net.trunk_width}; head of "
-        f"{config.parameters['head']} parameters"
-    )
-
-
-def _path(config: CheckpointConfig, sampler: SamplerConfig) -> str:
-    """Between noise and action; of a method without either, that there is none."""
-    if sampler.name in DIFFUSION_SAMPLERS:
-        levels, said = config.head.diffusion_levels, config.head.prediction
-        return f"squared-cosine schedule of {levels} levels, network predicts {said}"
-    if sampler.name == MULTISTEP:
-        levels, said = config.head.diffusion_levels, config.head.prediction
-        return (
-            f"squared-cosine schedule of {levels} levels, consistent at {GRID_STEPS} of them, "
-            f"network predicts {said}"
-        )
-    if sampler.name in ODE_SAMPLERS:
-        return "straight path from Gaussian noise, network predicts velocity"
-    if sampler.name == "consistency":
-        return f"straight path, consistent in {config.head.flow_segments} segments"
-    return "none: no transport from noise"
-
-
-def _precision(policy: NetworkPolicy) -> str:
-    found = {str(values.dtype) for values in policy.checkpoint.network.state_dict().values()}
-    return ", ".join(sorted(name.removeprefix("torch.") for name in found))

@@ -2,6 +2,7 @@
 
 import copy
 import io
+import shutil
 import zipfile
 
 import onnx
@@ -11,7 +12,8 @@ import yaml
 from onnx import TensorProto, helper
 from torch import nn
 
-from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.candidates.hosts.kinds import CHECKPOINT_FILES
+from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from tests.candidates.conftest import ENTRY
 
 WIDTH, ROWS, COLUMNS = 24, 16, 10
@@ -129,6 +131,23 @@ def written(tmp_path, torch_data, onnx_data):
         entry = copy.deepcopy({**common, "kind": kind, "files": files, **own[kind], **changes})
         path = tmp_path / f"{kind}.yaml"
         path.write_text(yaml.safe_dump({k: v for k, v in entry.items() if v is not None}))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def checkpoint(written, fleet):
+    """A function that writes the entry of a trained checkpoint, with other fields."""
+
+    def write(method="flow", **changes):
+        path = written("trained")
+        place = path.parent / "flow"
+        shutil.rmtree(place)
+        shutil.copytree(fleet[0] / method / "seed_0", place)
+        files = {f"flow/{name}": sha256_file(place / name) for name in CHECKPOINT_FILES}
+        entry = {**yaml.safe_load(path.read_text()), "files": files, **changes}
+        path.write_text(yaml.safe_dump(entry))
         return path
 
     return write

@@ -1,17 +1,19 @@
 """Programs and checkpoints are loaded in a child, and held against their entry, before all."""
 
 import pickle
+import socket
 
 import pytest
 
 from genpolicy.candidates.hosts.kinds import read_entry
-from genpolicy.candidates.hosts.loadable import require_loadable
+from genpolicy.candidates.hosts.loadable import require_answering, require_loadable
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.hashing import sha256_file
 from tests.candidates.conftest import ENTRY
 from tests.candidates.hosts.conftest import NOISE
 
 PATIENT = {"start_timeout_s": 300.0}
+IN_MM = {**ENTRY["action"], "position": {"columns": [0, 1, 2], "unit": "mm"}}
 OBSERVED = ENTRY["observation"]["observation"]
 
 
@@ -74,3 +76,28 @@ def test_one_that_takes_too_long_is_told_so(written, task):
 def test_what_would_run_is_not_started(written, task, kind, monkeypatch):
     monkeypatch.setattr("subprocess.run", lambda *_, **__: pytest.fail("it was started"))
     require(written(kind), task)
+
+
+def test_a_checkpoint_of_another_card_is_refused_by_its_host(checkpoint, task):
+    """Wrong before: the first stage took it, and the ladder trained."""
+    require(checkpoint(**PATIENT), task)
+    with pytest.raises(ConfigError, match=r"trained\.yaml.*refused by its host.*unit 'mm'.*'m'"):
+        require(checkpoint(action=IN_MM, **PATIENT), task)
+
+
+def test_a_server_that_runs_already_is_called(serving, entry_of, tmp_path):
+    """Wrong before: an address at which nobody answers was found behind all trainings."""
+    path = tmp_path / "planted.yaml"
+    with serving(lambda message: pytest.fail("it was asked"), {}) as address:
+        require_answering(entry_of(address=address), path)
+    for where in (address, "ws://127.0.0.1:1"):
+        with pytest.raises(ConfigError, match=rf"planted\.yaml: address is {where}.*Start it"):
+            require_answering(entry_of(address=where), path)
+    require_answering(entry_of(address=None, command=["never", "{port}"]), path)
+
+
+def test_one_that_hangs_is_not_waited_for_longer_than_an_answer(entry_of, tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"ws://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(ConfigError, match="where no policy answers"):
+            require_answering(entry_of(address=address, timeout_s=0.2), tmp_path / "planted.yaml")

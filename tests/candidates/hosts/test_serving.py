@@ -1,5 +1,3 @@
-import shutil
-
 import numpy as np
 import pytest
 
@@ -27,17 +25,8 @@ def test_each_kind_answers(written, kind):
     assert policy.metadata[WORD]["counts_evaluations"] is (kind != "scripted")
 
 
-def test_a_checkpoint_of_ours_is_served_as_by_serve_policy(written, fleet, policy):
-    path = written("trained")
-    shutil.rmtree(path.parent / "flow")
-    shutil.copytree(fleet[0] / "flow" / "seed_0", path.parent / "flow")
-    files = {f"flow/{name}": sha256_file(path.parent / "flow" / name)
-             for name in ("config.json", "model.safetensors")}  # fmt: skip
-    text = path.read_text()
-    for name, digest in read_entry(path).files.items():
-        text = text.replace(digest, files[name])
-    path.write_text(text)
-    assert served(path).metadata[WORD]["checkpoint"] == policy.checkpoint_hash
+def test_a_checkpoint_of_ours_is_served_as_by_serve_policy(checkpoint, policy):
+    assert served(checkpoint()).metadata[WORD]["checkpoint"] == policy.checkpoint_hash
 
 
 @pytest.mark.parametrize("kind", ["torch", "onnx", "scripted", "trained"])

@@ -24,6 +24,7 @@ def test_others_are_hosted_by_one_command_that_holds_the_entry_to_what_it_says(w
     assert server.command[5:] == [
         "serve-candidate", str(path), "--port", "{port}", "--sha256", entry.sha256,
         "--width", f"observation={task.observation.dim}",
+        *(["--observation", task.observation.hash()] if kind == "trained" else []),
     ]  # fmt: skip
     same = ("name", "author", "files", "horizons", "observation", "action", "timeout_s")
     assert all(getattr(server, name) == getattr(entry, name) for name in same)

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from genpolicy.candidates.described import path_of
 from genpolicy.candidates.joining import READS, JoiningSettings
-from genpolicy.evidence.reproducibility.identity import _path, rule_sha256
+from genpolicy.evidence.reproducibility.identity import rule_sha256
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.settings import HeadConfig, SamplerConfig
 
@@ -32,6 +33,6 @@ def test_no_two_rules_have_one_hash_and_what_a_rule_does_not_read_changes_none()
 @pytest.mark.parametrize("method", list(METHODS))
 def test_every_sampler_of_a_method_says_its_path_and_the_others_that_there_is_none(method):
     for name in METHODS[method].samplers:
-        text = _path(CONFIG, SamplerConfig.model_construct(name=name))
+        text = path_of(CONFIG, SamplerConfig.model_construct(name=name))
         for part in SAID.get(method, ("no transport",)):
             assert part in text, name
