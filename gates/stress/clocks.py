@@ -36,7 +36,7 @@ SHOWN = {
 }  # fmt: skip
 AGREE, DIFFER, UNTOLD, UNSEEN = "agree", "differ", "cannot be told apart or alike", "not looked at"
 LEAVES = (
-    "Recordings do not follow the policy: each question begins anew where the recorded arm is. That "
+    "Recordings do not follow the policy: each question begins anew where the recorded arm is. How "
     "the chunk before is executed while the policy answers, how chunks join and how a rollout ends "
     "was not seen by the wall clock."
 )
