@@ -57,8 +57,8 @@ def part_gain_findings(
             worst = size, int(column), chosen, others
     if worst is None or explained(data, motion, worst[2], worst[3], paced=True):
         return []
-    size, column, chosen, others = worst
-    name = motion.names[column]
+    size, place, chosen, others = worst
+    name = motion.names[place]
     if _shared(gains[:, asked], size, chosen, others):
         name = "position"
     return [_finding(data, name, chosen, size, float(np.exp(least)))]
