@@ -31,6 +31,7 @@ from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.contract.action import action_contract_hash
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.tasks.api import load_task
@@ -143,7 +144,9 @@ def main() -> None:
     task = load_task("tabletop_insertion")
     with TemporaryDirectory() as place, ExitStack() as stack:
         folder = Path(place)
-        untrained(folder / CHECKPOINT)
+        untrained(
+            folder / CHECKPOINT, observation=task.observation.hash(), action=action_contract_hash()
+        )
         policy = load_policy(folder / CHECKPOINT)
         ways: dict[str, Way] = {"bare network": bare(policy), "in this process": here(policy)}
         channels = [channel.name for channel in task.observation.channels]

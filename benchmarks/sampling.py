@@ -53,8 +53,11 @@ REPEATS, DISCARDED = 60, 5
 OBSERVATION, ACTION = 24, 10
 
 
-def untrained(folder: Path) -> NetworkPolicy:
-    """A diffusion policy of the configured size after one update."""
+NOTHING = "0" * 64
+
+
+def untrained(folder: Path, *, observation: str = NOTHING, action: str = NOTHING) -> NetworkPolicy:
+    """A diffusion policy of the configured size after one update, of contracts by their hashes."""
     settings = PolicySettings(**PARAMS["policy"])
     rng = np.random.default_rng(0)
     windows = Windows(
@@ -71,8 +74,8 @@ def untrained(folder: Path) -> NetworkPolicy:
         network=settings.network, head=settings.head,
         training=settings.training.model_copy(update={"updates": 1}), sampler=SAMPLER,
         provenance=Provenance(
-            dataset_manifest_sha256="0" * 64, action_contract_sha256="0" * 64,
-            observation_contract_sha256="0" * 64,
+            dataset_manifest_sha256=NOTHING, action_contract_sha256=action,
+            observation_contract_sha256=observation,
         ),
         seed=0,
     )  # fmt: skip
