@@ -193,8 +193,8 @@ def _told(alike: Iterable[Integers], chosen: Flags) -> float:
 
 def _nearest(places: Array) -> Iterator[Integers]:
     """Those nearest to each, without itself."""
-    _, near = cKDTree(places).query(places, k=ALIKE + 1)
-    for number, row in enumerate(np.atleast_2d(near)):
+    near = np.asarray(cKDTree(places).query(places, k=ALIKE + 1)[1])
+    for number, row in enumerate(near):
         yield np.asarray(row[row != number][:ALIKE], dtype=np.int64)
 
 
