@@ -5,6 +5,7 @@ turned frame is not taken for a lag. What is reported stands out of what the spr
 explains, and of a floor below which nothing is looked for; whether it is a fault is not said here.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +30,7 @@ from genpolicy.audit.semantics.drift import (
     episode_drifts,
     order_findings,
 )
-from genpolicy.audit.semantics.following import following
+from genpolicy.audit.semantics.following import Following, following
 from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.frozen import frozen_findings, stream_gap_findings
 from genpolicy.audit.semantics.gains import part_gain_findings
@@ -92,15 +93,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *copies.copy_findings(copied, data, settings),
         *calibration.release_findings(data, releases, settings),
     ]
-    kinds = {finding.kind for finding in findings}
-    if not kinds & {"unit", "frame", "swapped_columns", "gaps", *MOVED}:
-        sized = mattering(data, recorded) & ~recorded.directional
-        findings += part_gain_findings(data, recorded, follows, sized, settings)
-        kinds = {finding.kind for finding in findings}
-    if not kinds & {"unit", "frame", "swapped_columns"}:
-        findings += calibration.offset_findings(data, recorded, settings)
-        if not kinds & MOVED and not any(item.kind == "calibration" for item in findings):
-            findings += part_findings(data, recorded, follows, settings)
+    findings += _of_parts(data, recorded, follows, findings, settings)
     wander = calibration.start_note(data)
     shared = _shared_offset(data, settings)
     return Semantics(
@@ -115,6 +108,27 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         unclocked=unclocked,
         untold_freezes=untold,
     )
+
+
+def _of_parts(
+    data: AuditInput,
+    motion: Motion,
+    follows: Following,
+    found: Sequence[Finding],
+    settings: AuditSettings,
+) -> list[Finding]:
+    """Factors and offsets of epochs and of parts of the episodes, where nothing else is why."""
+    kinds = {finding.kind for finding in found}
+    if kinds & {"unit", "frame", "swapped_columns"}:
+        return []
+    if not kinds & {"gaps", *MOVED}:
+        sized = mattering(data, motion) & ~motion.directional
+        if gained := part_gain_findings(data, motion, follows, sized, settings):
+            return gained
+    offsets = calibration.offset_findings(data, motion, settings)
+    if offsets or kinds & {"calibration", *MOVED}:
+        return offsets
+    return part_findings(data, motion, follows, settings)
 
 
 def _shared_offset(data: AuditInput, settings: AuditSettings) -> str:
