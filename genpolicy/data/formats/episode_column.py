@@ -1,8 +1,8 @@
-"""Which column of tables says where an episode begins: its name proposes, the rows decide.
+"""Which column of tables says where an episode begins: its name, or of two names the rows.
 
 `run` is the episode of one recorder and the session of another, with twenty episodes under one
-value. An identifier of episodes changes where rows begin anew; one that stays is a session, which
-may be why its demonstrations differ from those of the next.
+value; every other name of the list says what it is. A session may be why its demonstrations differ
+from those of the next, so it is asked as a reason, and its episodes begin where their clock does.
 """
 
 from collections import Counter
@@ -24,8 +24,16 @@ from genpolicy.errors import BadInputError
 
 # Fewer rows that begin anew inside a value are damage.
 LEAST_RESTARTS, RESTARTS_SHARE = 2, 0.5
+# So many values beside files are sessions; of one that comes twice by mistake there are more.
+SHARED = 2.0 / 3.0
 # Other recorders mean a session by these; any other name of the list says what it is.
 SESSIONS = ("run", "run_id")
+# These may count what is done in an episode, or the rows of all of them.
+OTHER_COUNTERS = ("step", "index")
+# A clock rises from row to row, and a number of rows by one, but for damage.
+COUNTS = 0.9
+# It begins anew where it falls back by more than this share of what it had reached.
+FALLS = 0.5
 Flags = NDArray[np.bool_]
 
 
@@ -45,54 +53,60 @@ class EpisodeColumn:
 
 
 class Looked:
-    """What a pass over the files told of columns: their runs, and where a counter begins anew."""
+    """What a pass over the files told of a column: its runs, and where a counter begins anew."""
 
-    def __init__(self, counter: str | None, names: Sequence[str]) -> None:
+    def __init__(self, counter: str | None, name: str | None, *, by_one: bool) -> None:
         """Nothing yet.
 
         Args:
             counter: Numbers or times of rows; None where there are none.
-            names: Columns that may change with the episode.
+            name: Column that may be a session; None for none.
+            by_one: Whether the counter rises by one.
         """
-        self.counter, self.names = counter, names
-        self.files = self.restarts = 0
-        self._changes: Counter[str] = Counter()
-        self._inside: Counter[str] = Counter()
-        self._outside: Counter[str] = Counter()
-        self._constant: Counter[str] = Counter()
-        self._keys: dict[str, set[str]] = {name: set() for name in names}
+        self.counter, self.name, self._by_one = counter, name, by_one
+        self.files = self._restarts = self._changes = self._inside = self._constant = 0
+        self._steps = self._counted = 0
+        self._keys: set[str] = set()
 
     def add(self, table: Table) -> None:
         """Look at one file, some thousand rows at a time."""
-        before = Counter(self._changes)
-        keys: dict[str, str] = {}
-        for values, changed, anew in changes(table, self.counter, self.names):
-            self.restarts += int(anew.sum())
-            for name in self.names:
-                self._changes[name] += int(changed[name].sum())
-                self._inside[name] += int((anew & ~changed[name]).sum())
-                self._outside[name] += int((changed[name] & ~anew).sum())
-                keys.setdefault(name, key_of(values[name][:1].tolist()[0]))
-        for name, key in keys.items():
-            self._constant[name] += self._changes[name] == before[name]
-            self._keys[name].add(key)
+        before = self._changes
+        names = [self.name] if self.name else []
+        first = True
+        for values, changed, anew in changes(table, self.counter, names):
+            self._restarts += int(anew.sum())
+            if self.counter is not None:
+                steps = np.diff(as_float(values[self.counter]))[~anew[1:]]
+                self._steps += len(steps)
+                counted = np.abs(steps - 1.0) < 1e-9 if self._by_one else steps > 0.0
+                self._counted += int(counted.sum())
+            if self.name:
+                self._changes += int(changed[self.name].sum())
+                self._inside += int((anew & ~changed[self.name]).sum())
+                if first:
+                    self._keys.add(key_of(values[self.name][:1].tolist()[0]))
+            first = False
+        self._constant += self._changes == before
         self.files += 1
 
-    def is_session(self, name: str) -> bool:
+    @property
+    def counts(self) -> bool:
+        """Whether the counter counts rows."""
+        return self._counted >= COUNTS * self._steps
+
+    @property
+    def is_session(self) -> bool:
         """Whether rows begin anew inside its values, or several files share one."""
-        values = self._changes[name] + self.files
-        many = self._inside[name] >= max(LEAST_RESTARTS, RESTARTS_SHARE * values)
-        shared = self._constant[name] == self.files and 1 < len(self._keys[name]) < self.files
+        values = self._changes + self.files
+        many = self.counts and self._inside >= max(LEAST_RESTARTS, RESTARTS_SHARE * values)
+        # One value that comes twice is a copy or a mistake, which the import refuses by name.
+        shared = self._constant == self.files and 1 < len(self._keys) <= SHARED * self.files
         return many or shared
 
     @property
     def begins_anew(self) -> bool:
         """Whether files hold several episodes, by their counter alone."""
-        return self.restarts >= max(LEAST_RESTARTS, RESTARTS_SHARE * self.files)
-
-    def agrees(self, name: str) -> bool:
-        """Whether it changes where the counter begins anew, and nowhere else."""
-        return self.begins_anew and not self._inside[name] and not self._outside[name]
+        return self.counts and self._restarts >= max(LEAST_RESTARTS, RESTARTS_SHARE * self.files)
 
 
 def episode_column(
@@ -103,53 +117,44 @@ def episode_column(
     Args:
         tables: Gives every readable file.
         columns: The columns that the files have.
-        labels: What the names say; its `frame` or `time` counts the rows of an episode.
+        labels: What the names say; its `time` or `frame` counts the rows of an episode.
     """
     names = [c.name for c in columns.values() if c.width is None]
     by_name = {name.lower(): name for name in reversed(names)}
     called = [by_name[name] for name in NAMES["episode"] if name in by_name]
+    if called and called[0].lower() not in SESSIONS:
+        return EpisodeColumn(called[0])
     numbers = {c.name for c in columns.values() if c.width is None and c.kind == "number"}
-    counters = [n for n in (labels.frame, labels.time) if n in numbers]
-    if not called and not counters:
+    counters = [
+        name
+        for name in (labels.time, labels.frame)
+        if name in numbers and name is not None and name.lower() not in OTHER_COUNTERS
+    ]
+    counter, name = counters[0] if counters else None, called[0] if called else None
+    if counter is None and name is None:
         return EpisodeColumn(None)
-    looked = _looked(tables, counters[0] if counters else None, called)
-    sessions = [name for name in called if looked.is_session(name)]
-    good = [name for name in called if name not in sessions]
-    if good and not (sessions and called.index(sessions[0]) < called.index(good[0])):
-        return EpisodeColumn(good[0])
-    if not sessions and not looked.begins_anew:
-        return EpisodeColumn(None)
-    labelled = set(labels.named().values())
-    others = [name for name in names if name not in labelled and name not in called]
-    if not good and looked.begins_anew:
-        again = _looked(tables, looked.counter, others)
-        good = [name for name in sorted(others) if again.agrees(name)][:1]
-    return _without_name(looked, sessions[0] if sessions else None, good)
-
-
-def _without_name(looked: Looked, session: str | None, good: Sequence[str]) -> EpisodeColumn:
-    """Where episodes begin, if not where the column does whose name says so."""
-    asked = f"; {session} is asked as a reason." if session else "."
-    found = f"{session} has one value for several episodes: " if session else ""
-    if good:
-        return EpisodeColumn(good[0], notes=(f"{found}{good[0]} was taken for the episode{asked}",))
-    if not looked.begins_anew:
-        return EpisodeColumn(None, notes=(f"{found}each file is an episode{asked}",))
-    if session is not None and session.lower() not in SESSIONS:
-        # By its name it is an episode, and rows that begin anew in one are refused.
-        return EpisodeColumn(session)
-    begins = f"{'an' if found else 'An'} episode begins where {looked.counter} begins anew"
-    note = f"{found}{begins}{asked}"
-    return EpisodeColumn(session, looked.counter, (note,))
+    looked = _looked(tables, counter, name, by_one=counter != labels.time)
+    if name is None:
+        note = f"An episode begins where {counter} begins anew."
+        return EpisodeColumn(None, counter, (note,)) if looked.begins_anew else EpisodeColumn(None)
+    if not looked.is_session:
+        return EpisodeColumn(name)
+    found = f"{name} has one value for several episodes: "
+    if looked.begins_anew:
+        note = f"{found}an episode begins where {counter} begins anew; {name} is asked as a reason."
+        return EpisodeColumn(name, counter, (note,))
+    return EpisodeColumn(
+        None, None, (f"{found}each file is an episode; {name} is asked as a reason.",)
+    )
 
 
 def _looked(
-    tables: Callable[[], Iterator[Table]], counter: str | None, names: Sequence[str]
+    tables: Callable[[], Iterator[Table]], counter: str | None, name: str | None, *, by_one: bool
 ) -> Looked:
-    looked = Looked(counter, names)
+    looked = Looked(counter, name, by_one=by_one)
     for table in tables():
         single = {c.name for c in table.columns.values() if c.width is None}
-        if {counter, *names} - {None} <= single:
+        if {counter, name} - {None} <= single:
             with suppress(BadInputError):  # the import refuses what is damaged, by its name
                 looked.add(table)
     return looked
@@ -184,7 +189,7 @@ def changes(
 ) -> Iterator[tuple[dict[str, NDArray[Any]], dict[str, Flags], Flags]]:
     """Values, where each column changes, and where a counter begins anew, batch by batch.
 
-    A counter begins anew where it falls back to the first value of the file or below.
+    A counter begins anew where it falls most of the way back to the first value of the file.
     """
     wanted = list(dict.fromkeys([*names, *([counter] if counter else [])]))
     before: dict[str, Any] = {}
@@ -198,8 +203,8 @@ def changes(
         if counter is not None:
             numbers = as_float(values[counter])
             first = numbers[0] if not before else first
-            last = float(before[counter]) if before else numbers[0]
-            anew = (np.diff(numbers, prepend=last) < 0.0) & (numbers <= first)
+            reached = np.concatenate([[float(before[counter]) if before else first], numbers[:-1]])
+            anew = (numbers < reached) & (numbers - first <= FALLS * (reached - first))
         before = {name: values[name][-1] for name in wanted}
         yield values, changed, anew
 

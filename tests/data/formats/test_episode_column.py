@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from long_tables import rows
+from long_tables import UUIDS, rows
 
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats import open_dataset
@@ -43,19 +43,80 @@ def test_a_session_is_no_episode_and_its_rows_begin_anew(layouts, tmp_path):
     opened, kept = imported(written(layouts, tmp_path / "t.parquet"), tmp_path)
     assert (opened.found, opened.accepted) == (EPISODES, EPISODES)
     assert (
-        "run has one value for several episodes: an episode begins where step begins anew; "
+        "run has one value for several episodes: an episode begins where timestamp begins anew; "
         "run is asked as a reason."
     ) in opened.notes
     assert {runs.values[0] for runs in kept["run"]} == {"morning", "noon", "evening", "night"}
 
 
-def test_the_column_that_changes_with_the_rows_is_taken(layouts, tmp_path):
-    path = written(layouts, tmp_path / "t.parquet", take=lambda i: 7 * i, half=lambda i: i // 4)
+@pytest.mark.parametrize("name", ["take", "goal_x"])
+def test_no_other_column_is_taken_for_the_episode(layouts, tmp_path, name):
+    """It may be what decides: what was taken for the episode would never be asked."""
+    path = written(layouts, tmp_path / "t.parquet", **{name: lambda i: 7 * i})
     opened, kept = imported(path, tmp_path)
-    assert opened.accepted == EPISODES
-    assert opened.contract.labels.episode == "take"
-    assert any("take was taken for the episode; run is asked" in note for note in opened.notes)
-    assert "run" in kept and "take" not in kept
+    assert opened.accepted == EPISODES and {"run", name} <= set(kept)
+    assert any("an episode begins where timestamp begins anew" in n for n in opened.notes)
+
+
+def _at(part, name, values):
+    return part.set_column(part.column_names.index(name), name, pa.array(values))
+
+
+HELD = (np.arange(30) // 5) % 3
+
+
+@pytest.mark.parametrize("named", [
+    {"episode_index": lambda i: i, "attempt": lambda i: i % 3}, {"run": lambda i: i},
+])  # fmt: skip
+@pytest.mark.parametrize("clock", [True, False])
+def test_a_number_that_counts_something_else_cuts_no_episode(layouts, tmp_path, named, clock):
+    """A step of a plan that is held and tried again falls back inside the episode."""
+    parts = []
+    for i in range(EPISODES):
+        part = table(layouts, i, **{name: [value(i)] * 30 for name, value in named.items()})
+        part = _at(part, "step", HELD)
+        parts.append(part if clock else part.drop_columns(["timestamp"]))
+    pq.write_table(pa.concat_tables(parts), tmp_path / "t.parquet")
+    source = ParquetFiles(tmp_path / "t.parquet")
+    assert source.labels.episode == next(iter(named))
+    assert len(list(source.episodes(["tool_x_m"], source.labels.episode))) == EPISODES
+
+
+@pytest.mark.parametrize("clock", [True, False])
+def test_files_without_any_name_stay_whole_where_something_else_is_counted(
+    layouts, tmp_path, clock
+):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for i in range(EPISODES):
+        part = table(layouts, i).drop_columns(["run"])
+        part = _at(part, "step", HELD)
+        part = part if clock else part.drop_columns(["timestamp"])
+        pq.write_table(part, folder / f"{i}.parquet")
+    source = ParquetFiles(folder)
+    assert len(list(source.episodes(["tool_x_m"], source.labels.episode))) == EPISODES
+
+
+def test_an_identifier_that_comes_twice_is_refused_and_no_session(layouts, tmp_path):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for i in range(EPISODES):
+        name = UUIDS[3 if i == 7 else i]
+        part = table(layouts, i, episode_uuid=[name] * 30).drop_columns(["run"])
+        pq.write_table(part, folder / f"{i}.parquet")
+    opened, _ = imported(folder, tmp_path)
+    assert (opened.found, opened.accepted) == (EPISODES, EPISODES - 1)
+    assert opened.contract.labels.episode == "episode_uuid"
+
+
+def test_a_clock_that_begins_a_little_later_each_time_begins_anew(layouts, tmp_path):
+    parts = [
+        _at(table(layouts, i), "timestamp", 0.05 * ((7 * i) % 5) / 5 + np.arange(30) / 20)
+        for i in range(EPISODES)
+    ]
+    pq.write_table(pa.concat_tables(parts), tmp_path / "t.parquet")
+    source = ParquetFiles(tmp_path / "t.parquet")
+    assert len(list(source.episodes(["tool_x_m"], source.labels.episode))) == EPISODES
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -93,7 +154,7 @@ def test_without_any_name_rows_that_begin_anew_are_episodes(layouts, tmp_path):
     pq.write_table(pa.concat_tables(parts), tmp_path / "t.parquet")
     opened, _ = imported(tmp_path / "t.parquet", tmp_path)
     assert (opened.found, opened.accepted) == (EPISODES, EPISODES)
-    assert "An episode begins where step begins anew." in opened.notes
+    assert "An episode begins where timestamp begins anew." in opened.notes
 
 
 def test_a_gap_or_a_jump_in_one_episode_is_damage_as_before(layouts, tmp_path):
