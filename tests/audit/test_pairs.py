@@ -94,6 +94,55 @@ def test_columns_that_say_nothing_make_pairs_as_often_as_is_said(plain):
     assert LEVEL == 0.001
 
 
+def sessions(data, each=5):
+    """The data, recorded in sessions, and the session of each episode."""
+    table = replace(data.episodes, order=np.arange(N, dtype=float))
+    return replace(data, episodes=table), np.arange(N) // each
+
+
+def test_what_sessions_had_makes_no_pair_where_ways_lean_by_session(plain):
+    """Free draws of single episodes call such columns a pair in one data set of four."""
+    data, links = plain
+    data, session = sessions(data)
+    found = 0
+    for seed in range(12):
+        rng = stream(seed, "sessions")
+        side = rng.integers(0, 2, 20)[session]
+        modes = {phase: np.where(own < 0, own, side) for phase, own in links.items()}
+        variables = tuple(
+            Variable(f"n{k}", numbered(rng.integers(0, 2, 20)[session])) for k in range(8)
+        )
+        found += bool(pairs(data, modes, variables))
+    assert found == 0
+
+
+def test_a_pair_is_found_though_one_of_the_two_is_of_the_session(plain):
+    data, links = plain
+    data, session = sessions(data)
+    side = np.maximum(only(links), 0)
+    batch = stream(1, "batch").integers(0, 2, 20)[session]
+    variables = Variable("batch", numbered(batch)), Variable("lamp", numbered((side - batch) % 2))
+    assert pairs(data, links, variables) == ["batch with lamp"]
+
+
+def test_what_a_measure_tells_alone_makes_no_pair(plain):
+    data, links = plain
+    number = stream(7, "thirds").permutation(N) / N
+    modes = {p: np.where(m < 0, m, (number > 1 / 3) & (number <= 2 / 3)) for p, m in links.items()}
+    high, low = (Variable(f"above{k}", numbered(number > k / 3)) for k in (1, 2))
+    assert pairs(data, modes, (high, low)) == ["above1 with above2"]
+    assert pairs(data, modes, (high, low, Variable("m", number))) == []
+
+
+def test_a_calibration_is_no_part_of_a_pair(plain):
+    """It is a defect of the data, not a cause that one could observe."""
+    data, links = plain
+    lamp, batch = columns(4, np.maximum(only(links), 0), count=0)
+    epoch = np.array(["e0", "e1"])[batch.values]
+    data = replace(data, episodes=replace(data.episodes, calibration_epoch=epoch))
+    assert pairs(data, links, (lamp,)) == []
+
+
 def test_without_few_valued_columns_the_variables_are_what_they_were(plain):
     data, links = plain
     measure = Variable("t", np.linspace(0.0, 1.0, N))

@@ -85,11 +85,11 @@ def _shifted(recording: Recording, place: Place, strength: float) -> Recording:
 
 
 def _another_scale(recording: Recording, place: Place, factor: float) -> Recording:
-    """A third is told more or less of the same way: from its begin, where a place is told."""
+    """A third is told more or less of the same way, from its begin."""
 
     def change(episode: Episode) -> Episode:
         action, told = episode.action.copy(), recording.paired
-        begin = action[:1, told] if recording.form == "absolute" else 0.0
+        begin = action[:1, told]
         action[:, told] = begin + factor * (action[:, told] - begin)
         return replace(episode, action=action)
 
@@ -120,6 +120,6 @@ LATER = (
     Change(
         "a third of another scale", DEFECT, _another_scale, DEFECT_SAID.format("unit"),
         (1.5, 2.54, 0.5), "factor of the commanded motion",
-        fits=lambda r: bool(r.paired) and not published(r),
+        fits=lambda r: r.form == "absolute" and len(r.paired) > 1 and not published(r),
     ),
 )  # fmt: skip

@@ -118,10 +118,10 @@ def column_correlations(found: Following, starts: Integers) -> Array:
     result = np.zeros((len(starts) - 1, width, width))
     for number, (first, last) in enumerate(pairwise(starts)):
         late = int(lags[number])
+        if last - first - abs(late) < LEAST_ROWS:
+            continue
         asked = x[first + max(-late, 0) : last - max(late, 0)]
         seen = y[first + max(late, 0) : last - max(-late, 0)]
-        if len(asked) < LEAST_ROWS:
-            continue
         power = np.sqrt((seen**2).sum(axis=0))[:, None] * np.sqrt((asked**2).sum(axis=0))
         result[number] = (seen.T @ asked) / np.where(power > 0, power, np.inf)
     return result

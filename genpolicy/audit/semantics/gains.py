@@ -1,9 +1,10 @@
 """Factors in a part of the episodes: another scale of commands, of which no epoch tells.
 
-In some episodes a column goes by another factor of what it is told than in the others. That is also
-what a spring, a load and a fast hand do, which depend on where the arm is, on which way it took, on
-what it carries and on how fast it moves. So the factor must be there in both halves of the way,
-and episodes that went alike, and as fast, must stand on both sides.
+In some episodes the arm goes by another factor of what it is told than in the others. That is also
+what a spring, a load, a fast hand and a finger that is stopped do, which depend on where the arm
+is, on which way it took, on what it carries or holds and on how fast it moves. So most columns must
+be apart by one factor, in both halves of the way, and episodes that went alike, and as fast, must
+stand on both sides. Rates are not asked: a controller that clips them does the same.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.clocks import LEAST_EPISODES, two_clusters
 from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.offsets import explained
+from genpolicy.audit.semantics.offsets import added, explained
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import episode_sums
 from genpolicy.audit.settings import AuditSettings
@@ -40,11 +41,12 @@ def part_gain_findings(
         asked: Columns that move beside the others and have a unit. Shape (P,).
         settings: Limits.
     """
+    asked = asked & ~added(data, len(asked))
     alike = np.maximum(found.positive, found.negative) >= LIKE
     least = np.log(max(LEAST_FACTOR, settings.gain_epoch_floor))
     gains = np.where(alike, _logs(found.seen, found.asked), np.nan)
     halves = _of_halves(motion, found)
-    worst: tuple[float, int, Flags, Flags] | None = None
+    worst: tuple[float, Flags, Flags] | None = None
     for column in np.flatnonzero(asked):
         if np.count_nonzero(np.isfinite(gains[:, column])) < 2 * LEAST_EPISODES:
             continue
@@ -54,26 +56,31 @@ def part_gain_findings(
             continue
         size = float(np.median(gaps[chosen]))
         if worst is None or abs(size) > abs(worst[0]):
-            worst = size, int(column), chosen, others
-    if worst is None or explained(data, motion, worst[2], worst[3], paced=True):
+            worst = size, chosen, others
+    if worst is None:
         return []
-    size, place, chosen, others = worst
-    name = motion.names[place]
-    if _shared(gains[:, asked], size, chosen, others):
-        name = "position"
-    return [_finding(data, name, chosen, size, float(np.exp(least)))]
+    size, chosen, others = worst
+    if not _shared(gains[:, asked], size, chosen, others):
+        return []
+    if explained(data, motion, chosen, others, paced=True):
+        return []
+    return [_finding(data, chosen, size, float(np.exp(least)))]
 
 
 def _shared(gains: Array, size: float, chosen: Flags, others: Flags) -> bool:
-    """Whether most columns are apart by much the same factor."""
+    """Whether most columns, and more than one, are apart by much the same factor.
+
+    One alone may be a finger that is stopped by what it holds, of two widths.
+    """
     known = np.isfinite(gains)
     enough = [np.count_nonzero(known & side[:, None], axis=0) for side in (chosen, others)]
     told = np.minimum(*enough) >= LEAST_EPISODES
-    if not told.any():
+    if np.count_nonzero(told) < 2:
         return False
     apart = np.nanmedian(gains[chosen][:, told], axis=0)
     apart -= np.nanmedian(gains[others][:, told], axis=0)
-    return bool(np.mean(CONSTANT * abs(size) - np.abs(apart - size) >= 0) >= MOST)
+    same = CONSTANT * abs(size) - np.abs(apart - size) >= 0
+    return bool(np.count_nonzero(same) >= max(2, MOST * len(same)))
 
 
 def _logs(seen: Array, asked: Array) -> Array:
@@ -115,19 +122,19 @@ def _constant(halves: Array, chosen: Flags, others: Flags) -> bool:
     return all(CONSTANT * abs(usual) - abs(one - usual) >= 0 for one in apart)
 
 
-def _finding(data: AuditInput, name: str, chosen: Flags, size: float, floor: float) -> Finding:
+def _finding(data: AuditInput, chosen: Flags, size: float, floor: float) -> Finding:
     names, factor = data.episodes.uuid[chosen], float(np.exp(abs(size)))
     side = "more" if size > 0 else "less"
     return Finding(
         kind="unit",
-        variable=name,
+        variable="position",
         where=listed(names),
         question="gain_epoch_factor",
         measured=factor,
         floor=floor,
         unit="factor",
-        action=f"In {len(names)} of {len(chosen)} episodes ({listed(names)}) {name} moves by a "
-        f"factor of {factor:.4g} {side} of what it is told than in the others, all along ways that "
-        "others took too, as fast: bring the commands to one scale or leave those out, and repeat "
-        "the audit.",
+        action=f"In {len(names)} of {len(chosen)} episodes ({listed(names)}) the position moves by "
+        f"a factor of {factor:.4g} {side} of what it is told than in the others, all along ways "
+        "that others took too, as fast: bring the commands to one scale or leave those out, and "
+        "repeat the audit.",
     )

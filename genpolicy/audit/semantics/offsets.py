@@ -111,9 +111,7 @@ def _beside(data: AuditInput, motion: Motion, follows: Following) -> _Beside:
         2 * LEAST_EPISODES, FOLLOWED * len(follows.follows)
     )
     enough &= ~motion.directional
-    if data.forms is not None and data.paired:
-        # What is added up begins where the arm is seen: there an offset of either is lost.
-        enough &= ~data.forms.added[np.arange(data.action.shape[1])[data.action_position]]
+    enough &= ~added(data, len(enough))  # begins where it is seen: an offset of either is lost
     columns, lengths = np.flatnonzero(enough), np.diff(motion.starts)
     first, last = (np.repeat(ends, lengths) for ends in (motion.starts[:-1], motion.starts[1:] - 1))
     asked = np.empty((len(first), len(columns)))
@@ -129,6 +127,14 @@ def _beside(data: AuditInput, motion: Motion, follows: Following) -> _Beside:
         pace=_pace(asked, motion.starts) + _pace(seen, motion.starts),
         starts=motion.starts,
     )
+
+
+def added(data: AuditInput, width: int) -> Flags:
+    """Columns of the motion whose commands are changes or rates, added up. Shape (P,)."""
+    if data.forms is None or not data.paired:
+        return np.zeros(width, dtype=bool)
+    places = np.arange(data.action.shape[1])[data.action_position]
+    return np.asarray(data.forms.added[places])
 
 
 def _everywhere(beside: _Beside, place: int, chosen: Flags, others: Flags) -> bool:
@@ -193,7 +199,7 @@ def _told(alike: Iterable[Integers], chosen: Flags) -> float:
 
 def _nearest(places: Array) -> Iterator[Integers]:
     """Those nearest to each, without itself."""
-    near = np.asarray(cKDTree(places).query(places, k=ALIKE + 1)[1])
+    near = np.asarray(cKDTree(places).query(places, k=min(ALIKE + 1, len(places)))[1])
     for number, row in enumerate(near):
         yield np.asarray(row[row != number][:ALIKE], dtype=np.int64)
 

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from arms import SETTINGS, arms, build, late, parts
 from robots import chosen, flipped, lagged, robot, swapped
 
+from genpolicy.audit.semantics import measure
 from genpolicy.audit.semantics.following import column_correlations, following
 from genpolicy.audit.semantics.motion import make_motion
 
@@ -45,3 +47,16 @@ def test_swapped_columns_answer_each_other():
     table = column_correlations(found, motion.starts)
     assert np.all(table[hit, 0, 5] > 0.9) and np.all(table[hit, 5, 0] > 0.9)
     assert np.median(table[~hit, 0, 0]) > 0.9
+
+
+@pytest.mark.parametrize("place", [0, 1, -1])
+@pytest.mark.parametrize("rows", [3, 5, 12])
+def test_an_episode_shorter_than_its_lag_correlates_with_nothing(place, rows):
+    """Wherever it stands; at the begin its rows were taken for those of the whole table."""
+    commands, seen = parts(late(arms(41, width=2), 6, np.ones(60, dtype=bool)))
+    commands[place], seen[place] = commands[place][:rows], seen[place][:rows]
+    data = build(commands, seen, epochs=1, period_s=0.05)
+    motion = make_motion(data)
+    found = following(motion, data.period_s, SETTINGS.maximum_lag_rows)
+    assert np.all(column_correlations(found, motion.starts)[place] == 0.0) or rows == 12
+    measure(data, SETTINGS)

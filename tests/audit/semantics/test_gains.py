@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import SETTINGS, arms, parts, rebuilt, some
+from arms import SETTINGS, arms, build, parts, rebuilt, some
 
+from genpolicy.audit.forms import Forms
 from genpolicy.audit.semantics import measure
 
 PART = 1.0 / 3.0
@@ -48,10 +49,37 @@ def test_commands_of_another_scale_in_a_part_are_a_unit(factor, told):
     assert (" more of what" in item.action) == ((factor > 1) != told)
 
 
-def test_one_joint_of_another_scale_is_named():
+@pytest.mark.parametrize("speed", [0.1, 0.4])
+@pytest.mark.parametrize("widths", [(0.02, 0.05), (0.01, 0.05), (0.0, 0.045)])
+def test_a_finger_that_is_stopped_by_what_it_holds_is_none(widths, speed):
+    """Of two widths that nobody recorded, independent of the way: most data has such a column."""
+    data = one_epoch(52)
+    commands, seen = parts(data)
+    wide = some(data, 0.5)
+    for number, (command, part) in enumerate(zip(commands, seen, strict=True)):
+        asked, opening = np.full(len(command), 0.08), np.full(len(command), 0.08)
+        asked[int(0.3 * len(command)) : int(0.8 * len(command))] = 0.0
+        for row in range(1, len(command)):
+            goal = max(asked[row - 1], widths[int(wide[number])])
+            step = np.clip(goal - opening[row - 1], -speed * 0.05, speed * 0.05)
+            opening[row] = opening[row - 1] + step
+        commands[number] = np.column_stack([command, asked])
+        seen[number] = np.column_stack([part, opening])
+    assert found(build(commands, seen, epochs=1, period_s=0.05)) == []
+
+
+def test_one_joint_of_another_scale_is_not_told_from_one_that_is_stopped():
     data = one_epoch(52, width=7)
-    (item,) = found(gained(data, some(data, PART), np.where(np.arange(7) == 4, 0.6, 1.0)))
-    assert item.variable == "j4" and item.measured == pytest.approx(1 / 0.6, rel=0.1)
+    assert found(gained(data, some(data, PART), np.where(np.arange(7) == 4, 0.6, 1.0))) == []
+
+
+def test_rates_are_not_asked_for_a_controller_may_clip_them():
+    healthy = one_epoch(59)
+    data = gained(healthy, some(healthy, PART), 1.5, told=True)
+    assert found(data)
+    steps = np.vstack([np.diff(part, axis=0, prepend=part[:1]) for part in parts(data)[0]])
+    forms = Forms(np.ones(3, dtype=bool), np.ones(3), np.zeros(3), np.arange(3))
+    assert found(replace(data, action=steps, forms=forms)) == []
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
