@@ -10,6 +10,10 @@ import yaml
 from gates.exceptions import require_unmatched, unmatched_written, utc_today
 from gates.floors import LONGEST_DAYS
 from gates.overriders import require_in_force, require_written
+from gates.package.bundling import package
+from gates.printed import problems_beside
+from gates.proof import Rung
+from gates.report import report_path
 from genpolicy.errors import ConfigError
 
 LAST = datetime.date(2026, 12, 24)
@@ -67,6 +71,23 @@ def test_who_judges_or_goes_on_asks_for_the_day(tmp_path):
         ask(LAST)
         with pytest.raises(ConfigError, match="over since 2026-12-24"):
             ask(LAST + datetime.timedelta(1))
+
+
+def test_neither_the_chain_nor_a_bundle_is_green_under_one_that_is_over(monkeypatch, tmp_path):
+    """Both looked at the last report alone, which says nothing of `gate_b.unmatched`."""
+    report = SimpleNamespace(
+        overrides=(), settings={"unmatched": {"mine": {**ENTRY, "expires": "2020-01-01"}}}
+    )
+    rungs = [Rung(gate, "n", "PASS", "", "", report_path(gate), 0) for gate in "ABCD"]
+    monkeypatch.setattr("gates.printed.page_problem", lambda root: None)
+    monkeypatch.setattr("gates.printed.read_report", lambda root, gate: (report, ""))
+    ((name, text, _, code),) = problems_beside(tmp_path, rungs)
+    assert (name, code) == ("override", 2) and "unmatched.mine is over since 2020-01-01" in text
+    assert problems_beside(tmp_path, rungs[:1]) == []
+    monkeypatch.setattr("gates.package.bundling.require_judged", lambda root: rungs)
+    monkeypatch.setattr("gates.package.bundling.read_report", lambda root, gate: (report, ""))
+    with pytest.raises(ConfigError, match="over since 2020-01-01"):
+        package(tmp_path, "mine")
 
 
 def test_today_is_the_day_in_utc():

@@ -28,8 +28,6 @@ from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig
 
-SHOWN = 16
-"""Signs of a hash."""
 HORIZONS = ("observation_horizon", "prediction_horizon", "action_period_s")
 """H_e is how chunks are used, not how they are made: a ladder may execute fewer rows."""
 
@@ -143,7 +141,7 @@ def _declared(said: Declared, policy: NetworkPolicy) -> Iterator[Said]:
     for name, value in own.items():
         yield Said(f"declared.{name}", getattr(said, name), value)
     for name, value in (("eta", eta_of(sampler)), ("tolerance", tolerance_of(sampler))):
-        if getattr(said, name) is not None:
+        if getattr(said, name) is not None and not (value is None and getattr(said, name) == 0.0):
             yield Said(f"declared.{name}", getattr(said, name), value)
     if not _allowed(said.evaluations, sampler):
         yield Said("declared.evaluations", said.evaluations, evaluations_of(sampler))
@@ -161,5 +159,5 @@ def _refuse(where: str, other: Sequence[Said], rule: str, action: str) -> NoRetu
 
 def _shown(value: object) -> str:
     if isinstance(value, str) and re.fullmatch(DIGEST, value):
-        return f"{value[:SHOWN]}…"
+        return value  # whole: it is what one writes into the entry
     return repr(value) if isinstance(value, str) else str(value)
