@@ -21,6 +21,7 @@ MAXIMUM_VALUE_BYTES = 2 << 30
 # What nothing depends on is read beside the rest where an episode of it is no larger.
 MAXIMUM_BESIDE_BYTES = 128 << 20
 TOO_LARGE = f"an episode of it is larger than {MAXIMUM_BESIDE_BYTES >> 20} MiB"
+NOT_READABLE = "not readable"
 ACTION = "Correct the recording, or leave this episode out."
 
 Progress = Callable[[int, int | None], None]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from genpolicy.data.formats.leaves import WIDEST, text_of
 from genpolicy.data.formats.source import (
     MAXIMUM_BESIDE_BYTES,
+    NOT_READABLE,
     TOO_LARGE,
     Also,
     Column,
@@ -32,7 +33,6 @@ from genpolicy.data.formats.zarr_arrays import (
 from genpolicy.errors import BadInputError
 
 NO_NUMBERS, OTHER_LENGTH = "no plain columns", "of another length than the episodes"
-NOT_READABLE = "not readable"
 PLACES = ("", "meta", "data", "info")
 
 

@@ -17,6 +17,7 @@ from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.leaves import WIDEST, text_of
 from genpolicy.data.formats.source import (
+    NOT_READABLE,
     TOO_LARGE,
     Also,
     Column,
@@ -35,7 +36,7 @@ from genpolicy.data.formats.zarr_arrays import (
     read_array,
     refuse,
 )
-from genpolicy.data.formats.zarr_beside import NOT_READABLE, OTHER_LENGTH
+from genpolicy.data.formats.zarr_beside import OTHER_LENGTH
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree

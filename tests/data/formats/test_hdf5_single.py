@@ -14,7 +14,7 @@ from genpolicy.data.formats.hdf5_single import (
     member,
     read_single,
 )
-from genpolicy.data.formats.source import TOO_LARGE
+from genpolicy.data.formats.source import NOT_READABLE, TOO_LARGE
 from genpolicy.errors import ContractError
 
 
@@ -77,6 +77,21 @@ def test_attributes_are_texts_and_a_model_is_none(demo):
     found, left = attributes_of(demo)
     assert found == {"goal": "[1, 0]", "side": "left"}
     assert left == {"model_file": MODEL, "picture": NO_VALUE}
+
+
+def test_what_is_declared_and_empty_is_named(demo):
+    demo.attrs["x"] = h5py.Empty("S1")
+    demo["note"] = h5py.Empty("f4")
+    assert attributes_of(demo) == ({}, {"x": NO_VALUE})
+    found = read_single(demo, READ, lambda column: True)
+    assert found.left == {"virtual": NO_VALUE, "note": NO_VALUE}
+
+
+def test_damage_is_named(demo):
+    demo.create_dataset("emb", data=np.ones((4, 8)), chunks=(4, 8), compression="gzip")
+    demo["emb"].id.write_direct_chunk((0, 0), b"damaged")
+    found = read_single(demo, READ, lambda column: True)
+    assert found.left == {"virtual": NO_VALUE, "emb": NOT_READABLE} and "wide" in found.by_row
 
 
 def test_what_is_too_large_to_read_beside_is_named(demo, monkeypatch):
