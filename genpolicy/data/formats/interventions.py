@@ -54,6 +54,14 @@ class Interventions:
         ]
 
 
+def flags_in(raw: RawEpisode, column: str | None) -> NDArray[np.float64] | None:
+    """The flags of an episode, by row or one for all of it; None where it has none."""
+    if column in raw.columns:
+        return flags_of(raw.columns[column])
+    said = raw.attributes.get(column) if column is not None else None
+    return None if said is None else flags_of(np.array([said], dtype=object))
+
+
 def flags_of(values: NDArray[np.generic]) -> NDArray[np.float64] | None:
     """0 or 1 by row, NaN where not recorded; None where a value is neither. Shape (n,)."""
     if values.ndim != 1:
