@@ -106,13 +106,11 @@ def settled(labels: Labels, sample: Sequence[RawEpisode], notes: list[str]) -> L
     One episode in which a label changes is damaged; if it is a quarter of them, they mean it so.
     A name that need not mean interventions (`takeover`) is their label only where it holds flags.
     """
-    guessed = labels.is_intervention
-    if guessed is not None and guessed.lower() in GUESSED:
-        if any(flags_in(episode, guessed) is None for episode in sample):
-            notes.append(
-                f"{guessed} holds no flags: it is a column, not the label of interventions."
-            )
-            labels = labels.model_copy(update={"is_intervention": None})
+    name = labels.is_intervention
+    guessed = name is not None and name.lower() in GUESSED
+    if guessed and any(flags_in(episode, name) is None for episode in sample):
+        notes.append(f"{name} holds no flags: it is a column, not the label of interventions.")
+        labels = labels.model_copy(update={"is_intervention": None})
     unsettled = {
         label: column
         for label in SETTLED

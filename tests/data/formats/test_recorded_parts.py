@@ -164,6 +164,23 @@ def test_arrays_of_several_numbers_an_episode(layouts, tmp_path):
     assert "changes row by row: force." in notes
 
 
+def test_what_comes_of_an_episode_is_named_and_not_asked(layouts, tmp_path):
+    ends = np.random.default_rng(0).normal(size=(EPISODES, 4))
+    path = buffer(layouts, tmp_path, **{"meta/final_state": ends, "meta/lamp": np.arange(EPISODES)})
+    root = zarr.open_group(str(path), mode="a", zarr_format=2)
+    root.attrs["episode_stats"] = [{"r": float(i), "l": 30 + i} for i in range(EPISODES)]
+    root.attrs["log"] = [{"episode": {"t": i}, "side": "ab"[i % 2]} for i in range(EPISODES)]
+    kept, notes = values_of(path, tmp_path)
+    assert set(kept) == {"lamp", "log.side"}
+    assert "comes of the episode: episode_stats, final_state, log.episode.t." in notes
+
+
+@pytest.mark.parametrize("version", ["v2", "v3"])
+def test_that_rows_and_episodes_have_numbers_is_no_news(layouts, tmp_path, version):
+    notes = values_of(getattr(layouts, version)(tmp_path / "recordings"), tmp_path)[1]
+    assert "index" not in notes
+
+
 def test_what_of_a_buffer_cannot_be_read_beside_refuses_nothing(layouts, tmp_path):
     path = buffer(
         layouts, tmp_path, **{"data/wide": np.ones((180, 5)), "meta/lamp": np.arange(EPISODES)}
