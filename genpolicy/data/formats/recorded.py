@@ -81,8 +81,7 @@ class Reasons:
         for name, text in raw.attributes.items():
             if name not in raw.columns and self.wants(Column(name, None)):
                 self._keep(name, text, uuid)
-        for name, share in self._interventions.add(raw).items():
-            self._runs.setdefault(name, {})[uuid] = Runs((0,), (share,))
+        self._interventions.add(raw)
 
     def _with_elements(
         self, columns: Mapping[str, NDArray[Any]]
@@ -158,7 +157,7 @@ class Reasons:
         ):
             if names:
                 notes.append(f"Not looked at as a reason, {why}: {_listed(names)}.")
-        return notes + self._interventions.notes()
+        return notes + self._interventions.notes(self.recorded())
 
     def _is_signal(self, name: str) -> bool:
         return self._flickering.get(name, 0) > FLICKERING_SHARE * self._episodes

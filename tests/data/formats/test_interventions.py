@@ -41,21 +41,23 @@ def test_flags_by_row_refuse_nothing_and_are_asked(layouts, tmp_path, name, kind
     kept = stored(episodes)
     number = episodes["source_file"].tolist().index("data/chunk-000/episode_000002.parquet")
     assert kept[name][number] == Runs((0, 18), (0.0, 1.0))
-    assert kept[f"{name} (share of the rows)"][number] == Runs((0,), (0.4,))
+    assert set(kept) == {name}
     assert (
         f"{name} says where a person corrected: 20% of the rows, in 3 of 6 episodes. It is asked "
-        "as a reason, and so is its share of an episode."
+        "as a reason."
     ) in opened.notes
 
 
-def test_flags_that_flicker_are_asked_by_their_share(layouts, tmp_path):
+def test_flags_that_flicker_are_no_reason_and_neither_is_how_many_there_are(layouts, tmp_path):
     def flags(i):
         return np.random.default_rng(i).random(30) < 0.1 * i
 
     path = recorded(layouts, tmp_path / "r", "is_intervention", flags)
     opened = open_dataset(path, out=tmp_path / "out")
     kept = stored(load_dataset(tmp_path / "out").episodes)
-    assert set(kept) == {"is_intervention (share of the rows)"}
+    assert not kept
+    said = [note for note in opened.notes if "where a person corrected" in note]
+    assert len(said) == 1 and said[0].endswith(" episodes.")
     assert any("changes row by row: is_intervention" in note for note in opened.notes)
 
 
