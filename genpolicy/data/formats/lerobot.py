@@ -115,7 +115,7 @@ class LeRobotDataset:
         if table.rows > MAXIMUM_EPISODE_ROWS:
             refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
         read = reading(table, self._needed(table, asked[0]), asked[1], rows=table.rows)
-        columns = read_columns(table, read.names, read.beside)
+        columns = read_columns(table, read.names, read.beside, read.left)
         yield self._raw((table, read), number, columns, table.label, done)
         return table.rows
 
@@ -125,7 +125,7 @@ class LeRobotDataset:
         """A file of several episodes, one after the other."""
         segments = find_segments(table, EPISODE)
         read = reading(table, self._needed(table, asked[0]), asked[1], rows=longest(segments))
-        for segment, columns in episodes_of(table, segments, read.names, read.beside):
+        for segment, columns in episodes_of(table, segments, read.names, read.beside, read.left):
             if isinstance(columns, Refusal):
                 yield columns
                 seen |= {int(segment.key)} if segment.key.isdigit() else set()

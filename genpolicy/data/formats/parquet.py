@@ -101,10 +101,12 @@ class ParquetFiles:
         having = Counter(name for found in names.values() for name in found)
         rank = {kind: (not kind, -kinds[kind], len(kind), kind) for kind in kinds}
         first: BadInputError | None = None
-        for path in sorted(self._files, key=lambda path: rank[names[path]]):
+        ranked = sorted(self._files, key=lambda path: rank[names[path]])
+        # Where all are damaged, one of which only a list that nothing may depend on is.
+        for path, hashed in ((path, hashed) for hashed in (False, True) for path in ranked):
             try:
                 label = path.relative_to(self._root).as_posix()
-                with open_table(path, label=label, hashed=False) as table:
+                with open_table(path, label=label, hashed=hashed) as table:
                     many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
                     return replace(table, columns=many or table.columns)
             except BadInputError as error:
@@ -120,7 +122,7 @@ class ParquetFiles:
             if table.rows > MAXIMUM_EPISODE_ROWS:
                 refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
             read = reading(table, wanted, also, rows=table.rows)
-            columns = read_columns(table, read.names, read.beside)
+            columns = read_columns(table, read.names, read.beside, read.left)
             check_columns(columns, label=table.label, known=self._known(table, read))
             yield RawEpisode(table.label, table.digest, columns, first_row=done, left=read.left)
             return table.rows
@@ -131,7 +133,7 @@ class ParquetFiles:
         )
         read = reading(table, wanted, also, rows=longest(segments))
         known = self._known(table, read)
-        for segment, found in episodes_of(table, segments, read.names, read.beside):
+        for segment, found in episodes_of(table, segments, read.names, read.beside, read.left):
             if isinstance(found, Refusal):
                 yield found
                 continue
