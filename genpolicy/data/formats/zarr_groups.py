@@ -20,10 +20,11 @@ from genpolicy.data.formats.source import (
     NOT_READABLE,
     TOO_LARGE,
     Also,
+    Budget,
     Column,
     RawEpisode,
+    bytes_of,
     check_columns,
-    is_large,
     nothing,
     refusal_of,
 )
@@ -141,8 +142,9 @@ def _beside(
     """Columns that nothing depends on, and those that are left out and why."""
     found: dict[str, NDArray[Any]] = {}
     left: dict[str, str] = {}
-    for column in more:
-        if is_large(column, rows):
+    budget = Budget()
+    for column in sorted(more, key=lambda column: (column.width or 1, column.name)):
+        if not budget.takes(bytes_of(column, rows)):
             left[column.name] = TOO_LARGE
             continue
         try:
