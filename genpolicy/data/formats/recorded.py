@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from genpolicy.data.formats.consequences import counts_rows, may_be_reason
 from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.interventions import Interventions
-from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, WIDEST, leaves, vector_of
+from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, SPANS, WIDEST, leaves, vector_of
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.vectors import Vectors, starts_of
 from genpolicy.data.variables import Recorded, Runs, runs_of, varying
@@ -24,6 +24,7 @@ SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+PARTS = "says what was done and when"
 UNEVEN = "no numbers in an episode, or rows of different widths"
 
 
@@ -122,7 +123,9 @@ class Reasons:
         for part, said in parts.items():
             if part != name and not self.wants(Column(part, None)):
                 continue
-            if (numbers := vector_of(said)) is not None:
+            if said == SPANS:
+                self._left.setdefault(PARTS, set()).add(part)
+            elif (numbers := vector_of(said)) is not None:
                 self._vectors.add(part, uuid, [0], [numbers])
             else:
                 self._runs.setdefault(part, {})[uuid] = Runs((0,), (said,))
