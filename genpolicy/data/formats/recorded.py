@@ -16,7 +16,7 @@ from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.interventions import Interventions
 from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, SPANS, WIDEST, leaves, vector_of
 from genpolicy.data.formats.source import Column, RawEpisode
-from genpolicy.data.formats.vectors import Vectors, starts_of
+from genpolicy.data.formats.vectors import MOST_DIFFERENT, Vectors, starts_of
 from genpolicy.data.variables import Recorded, Runs, runs_of, varying
 
 # A value must hold this many rows on average; less is a signal.
@@ -24,6 +24,8 @@ SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+# Of one observed column that the contract reads in part.
+MOST_ELEMENTS = 64
 PARTS = "says what was done and when"
 UNEVEN = "no numbers in an episode, or rows of different widths"
 
@@ -51,6 +53,7 @@ class Reasons:
         self._flickering: dict[str, int] = {}
         self._judging: set[str] = set()
         self._many: set[str] = set()
+        self._cut: set[str] = set()
         self._left: dict[str, set[str]] = {}
 
     def wants(self, column: Column) -> bool:
@@ -91,9 +94,11 @@ class Reasons:
         for name, values in columns.items():
             yield name, values
             if name in self._partly and values.ndim == 2 and values.shape[1] <= WIDEST:
-                for k in range(values.shape[1]):
-                    if (name, k) not in self._elements:
-                        yield f"{name}[{k}]", values[:, k]
+                others = [k for k in range(values.shape[1]) if (name, k) not in self._elements]
+                if len(others) > MOST_ELEMENTS:
+                    self._cut.add(name)
+                for k in others[:MOST_ELEMENTS]:
+                    yield f"{name}[{k}]", values[:, k]
 
     def _add_runs(self, name: str, values: NDArray[Any], uuid: str) -> None:
         runs = runs_of(values)
@@ -106,8 +111,7 @@ class Reasons:
             return
         starts = starts_of(values)
         if self._holds(name, len(starts), len(values)):
-            rows = [tuple(row) for row in values[starts].astype(np.float64).tolist()]
-            self._vectors.add(name, uuid, starts.tolist(), rows)
+            self._vectors.add(name, uuid, starts, values[starts])
 
     def _holds(self, name: str, runs: int, rows: int) -> bool:
         """Whether values hold for a while in an episode; else it is counted."""
@@ -126,7 +130,7 @@ class Reasons:
             if said == SPANS:
                 self._left.setdefault(PARTS, set()).add(part)
             elif (numbers := vector_of(said)) is not None:
-                self._vectors.add(part, uuid, [0], [numbers])
+                self._vectors.add(part, uuid, np.zeros(1), np.array([numbers]))
             else:
                 self._runs.setdefault(part, {})[uuid] = Runs((0,), (said,))
 
@@ -155,6 +159,8 @@ class Reasons:
             (wide, f"more than {WIDEST} numbers wide"),
             (signals, "changes row by row"),
             (judging, "counts rows or comes of the episode"),
+            (sorted(self._cut), f"all but the first {MOST_ELEMENTS} numbers that are not observed"),
+            (self._vectors.overfull(), f"more than {MOST_DIFFERENT} different rows"),
             (sorted(self._many), f"all but the first {MAXIMUM_LEAVES} of its parts"),
             *((sorted(names), why) for why, names in sorted(self._left.items())),
         ):

@@ -12,7 +12,7 @@ import zarr
 
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats.opening import open_dataset
-from genpolicy.data.formats.recorded import Reasons
+from genpolicy.data.formats.recorded import MOST_ELEMENTS, Reasons
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.zarr_buffer import PUSHT
 from genpolicy.data.variables import Runs, stored
@@ -265,6 +265,17 @@ def test_what_a_script_is_in_is_a_label_also_where_it_is_called_a_state(layouts,
     opened, kept = values_of(tmp_path / "plain", tmp_path)
     assert set(kept) == {"planner_state"}
     assert any("Taken as labels, not as observed: planner_state" in n for n in opened.notes)
+
+
+def test_only_some_of_the_numbers_of_an_observed_column_are_asked():
+    reasons = Reasons(PUSHT)  # it reads five numbers of the state
+    for uuid in "ab":
+        state = np.full((9, 5 + MOST_ELEMENTS + 2), float(uuid == "a"))
+        reasons.add(RawEpisode(uuid, "", {"state": state}), uuid)
+    assert set(reasons.recorded()) == {f"state[{k}]" for k in range(5, 5 + MOST_ELEMENTS)}
+    assert reasons.notes([]) == [
+        "Not looked at as a reason, all but the first 64 numbers that are not observed: state."
+    ]
 
 
 def test_what_is_not_kept_is_noted():
