@@ -1,7 +1,7 @@
 """Which columns of the recordings may be the reason, and their values by episode.
 
 Everything that the contract uses for nothing else, and that holds for a while: a value that
-changes from row to row is a signal, and what counts rows or judges the episode is no reason.
+changes from row to row is a signal, and what counts rows or comes of the episode is no reason.
 Whatever is left out is noted by its name.
 """
 
