@@ -11,11 +11,21 @@ from genpolicy.data.formats.units import tokens
 
 COUNTERS = {
     *("index", "frame_index", "step_index", "episode_index", "frame", "step", "timestamp"),
-    *("episode_uuid", "num_samples", "rows", "n_rows", "chunk_index", "file_index"),
+    *("episode_uuid", "num_samples", "rows", "n_rows", "chunk_index", "file_index", "frames"),
 }
 JUDGES = {
     *("reward", "rewards", "done", "dones", "terminal", "terminals", "terminated", "truncated"),
-    *("termination", "terminations", "success", "successes", "succeeded", "outcome", "outcomes"),
+    *(
+        "truncation",
+        "truncations",
+        "termination",
+        "terminations",
+        "success",
+        "successes",
+        "succeeded",
+        "outcome",
+        "outcomes",
+    ),
     *("fail", "failed", "failure", "failures", "discount", "quality", "rating", "ratings"),
     *("metric", "metrics", "stats", "statistics", "result", "results"),
 }
@@ -25,24 +35,29 @@ OF_A_JUDGE = {
     *("at", "first", "last"),
 }
 """Words that say no more beside one of these (`termination_reason`)."""
-MEASURES = {"return", "returns", "score", "length", "duration", "grade", "mask", "next"}
+MEASURES = {
+    *("return", "returns", "ret", "rew", "score", "length", "len", "duration", "grade"),
+    *("timeout", "timeouts", "mask", "next"),
+}
 """Words that are one only by themselves: the length of a tool decides, that of an episode not."""
 OF_AN_EPISODE = {
     *("episode", "episodes", "ep", "traj", "trajectory", "step", "steps", "action", "actions"),
     *("total", "sum", "mean", "max", "min", "cumulative", "final", "rate", "is", "was", "per"),
     *("valid", "pad", "padding", "attention", "loss", "sparse", "dense", "shaped", "env"),
-    *("demo", "demonstration", "rollout"),
+    *("demo", "demonstration", "rollout", "path"),
 }
 """Words that say nothing else beside one of these."""
 HOLDERS = {"info", "infos", "meta", "metadata", "data", "extra", "extras", "log", "logs", "attrs"}
 """Words of what holds anything: `info/length` is that of the episode, `tool/length` is not."""
-HOW_MANY = {"num", "n", "nr", "number", "count", "total", "elapsed", "of"}
+HOW_MANY = {"num", "n", "nb", "nr", "number", "count", "total", "elapsed", "of"}
 WHOSE = {"episode", "ep", "traj", "trajectory", "demo", "demonstration", "rollout"}
 COUNTED = {
     *("step", "steps", "frame", "frames", "row", "rows", "samples", "timestep", "timesteps"),
     *("transitions", "ticks"),
 }
 """`num_steps`, `elapsed_time`, `episode_frames`; a `sample_number` may be that of a material."""
+TAKEN = {"total", "elapsed", "execution", "completion", "finish", "stop"}
+"""Words of how long it took, beside `time`."""
 ENDINGS = ("last", "end", "terminal")
 AT_THE_END = {
     *("pose", "poses", "state", "states", "position", "positions", "pos", "distance", "dist"),
@@ -103,7 +118,7 @@ def _is_measure(words: list[str]) -> bool:
 def _is_count(words: list[str]) -> bool:
     said = {*_plain(words)}
     if "time" in said:
-        return bool(said & {"total", "elapsed"}) and said <= HOW_MANY | WHOSE | {"time"}
+        return bool(said & TAKEN) and said <= TAKEN | WHOSE | {"time"}
     counted = said & COUNTED and said & (HOW_MANY | WHOSE)
     return bool(counted) and said <= COUNTED | HOW_MANY | WHOSE
 

@@ -14,7 +14,8 @@ from genpolicy.data.formats.consequences import counts_rows, may_be_reason
      "final_goal", "final_target_position", "terminal_id", "tool.length", "mask/lamp_on",
      "mask/better", "num_objects", "sample_number", "goal.frame", "goal/index", "time_of_day",
      "rod_length_m", "ep_meta.lang", "episode.side", "episode.r2d2", "failure_mode",
-     "steel_grade", "start_time"],
+     "steel_grade", "start_time",
+     "rod_len", "rope_path_kind", "stop_position_mm", "info/side", "max_steps", "time_limit"],
 )  # fmt: skip
 def test_a_name_does_not_keep_a_column_from_being_a_reason(name):
     assert may_be_reason(name)
@@ -34,7 +35,8 @@ def test_a_name_does_not_keep_a_column_from_being_a_reason(name):
      "reward_terms", "duration_s", "length_ms", "num_steps", "total_frames", "n_samples",
      "elapsed_time", "elapsed_time_s", "episode_steps", "end_time", "end_time_s", "last_frame",
      "final_pose", "final_state", "final_state[0]", "meta/final_state", "final_cup_position",
-     "terminal_state", "last_distance", "info/frame_index"],
+     "terminal_state", "last_distance", "info/frame_index",
+     "path_length", "ep_len", "traj_len", "timeout", "completion_time", "truncations", "nb_frames"],
 )  # fmt: skip
 def test_what_counts_or_judges_is_no_reason(name):
     assert not may_be_reason(name)
