@@ -27,7 +27,7 @@ from genpolicy.data.formats.source import (
     refusal_of,
     refuse,
 )
-from genpolicy.data.formats.tables import Table, open_table, read_columns
+from genpolicy.data.formats.tables import Table, described, open_table, read_columns
 from genpolicy.errors import BadInputError
 
 UUID_COLUMN = "uuid"
@@ -100,18 +100,10 @@ class ParquetFiles:
         kinds = Counter(names.values())
         having = Counter(name for found in names.values() for name in found)
         rank = {kind: (not kind, -kinds[kind], len(kind), kind) for kind in kinds}
-        first: BadInputError | None = None
         ranked = sorted(self._files, key=lambda path: rank[names[path]])
-        # Where all are damaged, one of which only a list that nothing may depend on is.
-        for path, hashed in ((path, hashed) for hashed in (False, True) for path in ranked):
-            try:
-                label = path.relative_to(self._root).as_posix()
-                with open_table(path, label=label, hashed=hashed) as table:
-                    many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
-                    return replace(table, columns=many or table.columns)
-            except BadInputError as error:
-                first = first or error
-        raise first or AssertionError("no file was tried")
+        table = described([(path, path.relative_to(self._root).as_posix()) for path in ranked])
+        many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
+        return replace(table, columns=many or table.columns)
 
     def _of(
         self, table: Table, wanted: Sequence[str], episode: str | None, also: Also, done: int

@@ -57,7 +57,9 @@ class Table:
 
 
 @contextmanager
-def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table]:
+def open_table(
+    path: Path, *, label: str, hashed: bool = True, lenient: bool = False
+) -> Iterator[Table]:
     """A Parquet file, opened without following a link; bytes hashed are the bytes read.
 
     Its footer is read once before: what claims too much, or is no table, is never hashed.
@@ -66,6 +68,7 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
         path: The file.
         label: What texts call it.
         hashed: Off only where it is described and not read; the digest is empty then.
+        lenient: Describe it although the first row of a list cannot be read, as reading it does.
 
     Raises:
         BadInputError: Missing, a link, not Parquet, or larger in memory than the caps.
@@ -77,7 +80,7 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
             kinds = _kinds(file)
             _check_size(file, label)
             columns = {
-                name: _column(file, name, kind, read=hashed)
+                name: _column(file, name, kind, lenient=hashed or lenient)
                 for name, kind in kinds.items()
                 if kind is not None
             }
@@ -85,6 +88,26 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
             raise _unreadable(label, error) from error
         skipped = tuple(name for name, kind in kinds.items() if kind is None)
         yield Table(label, digest, file, columns, skipped)
+
+
+def described(files: Sequence[tuple[Path, str]]) -> Table:
+    """The first of some files that can be described, closed; one with a damaged list comes last.
+
+    Args:
+        files: Files with what texts call them, the likeliest first.
+
+    Raises:
+        BadInputError: What is wrong with the first, where none can be described.
+    """
+    first: BadInputError | None = None
+    for lenient in (False, True):
+        for path, label in files:
+            try:
+                with open_table(path, label=label, hashed=False, lenient=lenient) as table:
+                    return table
+            except BadInputError as error:
+                first = first or error
+    raise first or AssertionError("no file was tried")
 
 
 def batches(
@@ -292,7 +315,7 @@ def _check_size(file: pq.ParquetFile, label: str) -> None:
                 refuse(f"{label}: {chunk.path_in_schema}", found, "a bounded size", SPLIT_FILE)
 
 
-def _column(file: pq.ParquetFile, name: str, kind: str, *, read: bool) -> Column:
+def _column(file: pq.ParquetFile, name: str, kind: str, *, lenient: bool) -> Column:
     if kind != "vector":
         return Column(name, None, "text" if kind == "text" else "number")
     field = file.schema_arrow.field(name)
@@ -302,7 +325,7 @@ def _column(file: pq.ParquetFile, name: str, kind: str, *, read: bool) -> Column
     try:
         first = next(file.iter_batches(batch_size=1, columns=[name]), None)
     except (pa.ArrowException, OSError, MemoryError):
-        if not read:
+        if not lenient:
             raise
         # Refused as damaged where it is needed; nothing may depend on it.
         first = None
