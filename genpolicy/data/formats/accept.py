@@ -10,7 +10,7 @@ from genpolicy.data.assemble import FLAGS, STRATA, AcceptedEpisode, content_hash
 from genpolicy.data.checks import check_finite, check_frozen, check_range
 from genpolicy.data.contract import IngestContract
 from genpolicy.data.formats.contract import SI, ChannelSource, ImportContract, selectors
-from genpolicy.data.formats.interventions import flags_of
+from genpolicy.data.formats.interventions import flags_in
 from genpolicy.data.formats.source import RawEpisode, as_float, refuse
 from genpolicy.data.recording.episode import ACTION_STREAM, NOT_RECORDED, StreamSamples
 from genpolicy.data.resample import Rows
@@ -240,9 +240,9 @@ def _flag(raw: RawEpisode, contract: ImportContract, name: str) -> bool | None:
     if not hasattr(contract.labels, name):
         return None
     column = getattr(contract.labels, name)
-    if name == BY_ROW and column in raw.columns:
+    if name == BY_ROW:
         # Recorders of both flag each row in which a person acted.
-        flags = flags_of(raw.columns[column])
+        flags = flags_in(raw, column)
         known = None if flags is None else flags[np.isfinite(flags)]
         if known is not None:
             return bool(known.any()) if len(known) else None

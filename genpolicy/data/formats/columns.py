@@ -27,6 +27,8 @@ NAMES: dict[str, tuple[str, ...]] = {
         *("intervened", "human_intervention", "takeover"),
     ),
 }
+GUESSED = ("intervened", "human_intervention", "takeover")
+"""Names of interventions that may say something else, an arm that was taken over for one."""
 BOOKKEEPING = {
     *("index", "reward", "rewards", "done", "dones", "terminated", "truncated", "success", "id"),
     *("episode", "frame", "step", "timestamp", "time", "next", "task", "mask", "discount"),

@@ -19,7 +19,14 @@ from genpolicy.data.formats.leaves import (
     WIDEST,
     text_of,
 )
-from genpolicy.data.formats.source import TOO_LARGE, Also, Column, is_large, refuse
+from genpolicy.data.formats.source import (
+    NOT_READABLE,
+    TOO_LARGE,
+    Also,
+    Budget,
+    Column,
+    refuse,
+)
 
 OBSERVATIONS = "obs"
 # The observations of one row later.
@@ -31,6 +38,8 @@ NO_VALUE = "no plain value of a row or of the demonstration"
 MODEL = "the model of a simulator"
 # Filters of the library itself: deflate, shuffle, fletcher32, szip, nbit, scale-offset, lzf.
 FILTERS = (1, 2, 3, 4, 5, 6, 32000)
+# What a damaged file makes the library raise.
+READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
 REWRITE = "Write the file again with plain, internal data sets (h5repack)."
 
 
@@ -52,7 +61,7 @@ class Beside:
 def read_single(demo: Any, read: Mapping[str, NDArray[Any]], also: Also) -> Beside:
     """Data sets beside those read, by row or one value for the whole, and attributes of groups.
 
-    What is no plain data set of this file is passed over: nothing depends on it.
+    What is no plain data set of this file, or damaged, is passed over: nothing depends on it.
 
     Args:
         demo: Group of the demonstration.
@@ -61,15 +70,21 @@ def read_single(demo: Any, read: Mapping[str, NDArray[Any]], also: Also) -> Besi
     """
     found = Beside({}, {}, {})
     rows = len(next(iter(read.values()), ()))
+    budget = Budget()
     for name, data in _members(demo):
         if name in read:
             continue
-        if isinstance(data, h5py.Group):
-            single, left = attributes_of(data)
-            found.single.update({f"{name}/{key}": text for key, text in single.items()})
-            found.left.update({f"{name}/{key}": why for key, why in left.items()})
-        else:
-            _read_one(name, data, rows, also, found)
+        try:
+            if isinstance(data, h5py.Group):
+                single, left = attributes_of(data)
+                found.single.update({f"{name}/{key}": text for key, text in single.items()})
+                found.left.update({f"{name}/{key}": why for key, why in left.items()})
+            elif data is not None:
+                _read_one(name, data, rows, (also, budget), found)
+            else:
+                found.left[name] = NOT_READABLE
+        except READ_ERRORS:
+            found.left[name] = NOT_READABLE
     return found
 
 
@@ -78,43 +93,64 @@ def attributes_of(group: Any) -> tuple[dict[str, str], dict[str, str]]:
     found: dict[str, str] = {}
     left: dict[str, str] = {}
     for name in sorted(group.attrs):
-        value = group.attrs[name]
-        text = None if np.size(value) > WIDEST else text_of(value)
         if name == COUNT:
             continue
-        if text is None or len(text) > MAXIMUM_OBJECT:
-            left[str(name)] = NO_VALUE
-        elif len(text) > MAXIMUM_TEXT and text.lstrip().startswith(MARKUP):
-            left[str(name)] = MODEL
-        else:
+        try:
+            value = group.attrs[name]
+        except READ_ERRORS:
+            left[str(name)] = NOT_READABLE
+            continue
+        plain = not isinstance(value, h5py.Empty) and np.size(value) <= WIDEST
+        text = text_of(value) if plain else None
+        why = _why_left(text)
+        if text is not None and why is None:
             found[str(name)] = text
+        elif why is not None:
+            left[str(name)] = why
     return found, left
 
 
-def _read_one(name: str, data: Any, rows: int, also: Also, found: Beside) -> None:
+def _read_one(name: str, data: Any, rows: int, asked: tuple[Also, Budget], found: Beside) -> None:
     """One data set: by row, one value, a few values, or nothing that could be asked."""
+    if data.shape is None:  # declared and never written
+        found.left[name] = NO_VALUE
+        return
+    also, budget = asked
     width = int(data.shape[1]) if data.ndim == 2 else None
     plain = data.ndim <= 1 or (data.ndim == 2 and not _is_text(data))
-    column = Column(name, width)
     by_row = plain and data.ndim > 0 and rows > 1 and len(data) == rows
     if not _is_own(data) or not plain or (not by_row and not 0 < data.size <= WIDEST):
         # What was seen and is no column is named where the file is described.
         if not name.startswith(f"{OBSERVATIONS}/") and isinstance(data, h5py.Dataset):
             found.left[name] = NO_VALUE
-    elif by_row and is_large(column, rows):
+    elif not also(Column(name, width if by_row else None)):
+        return
+    elif not budget.takes(data.size * max(8, data.dtype.itemsize)):
         found.left[name] = TOO_LARGE
-    elif by_row and also(column):
+    elif by_row:
         values = _texts(data, MAXIMUM_TEXT) if _is_text(data) else np.asarray(data[...])
         found.by_row[name] = values
-    elif not by_row and also(Column(name, None)):
+    else:
         values = (_texts(data) if _is_text(data) else np.asarray(data[...])).reshape(-1)
         text = text_of(values[0] if len(values) == 1 else values)
-        if text is not None:
+        why = _why_left(text)
+        if text is not None and why is None:
             found.single[name] = text
+        elif why is not None:
+            found.left[name] = why
+
+
+def _why_left(text: str | None) -> str | None:
+    """Why what was written is not asked; None where it is."""
+    if text is None or len(text) > MAXIMUM_OBJECT:
+        return NO_VALUE
+    if len(text) > MAXIMUM_TEXT and text.lstrip().startswith(MARKUP):
+        return MODEL
+    return None
 
 
 def _members(demo: Any) -> Iterator[tuple[str, Any]]:
-    """Data sets and groups of a demonstration by their path, by hard links only, not too deep."""
+    """Data sets and groups by their path, by hard links only, not too deep; None if damaged."""
     held: list[tuple[str, Any, int]] = [("", demo, 0)]
     seen = 0
     while held:
@@ -125,7 +161,12 @@ def _members(demo: Any) -> Iterator[tuple[str, Any]]:
                 return
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue
-            path, member = f"{prefix}{name}", group[name]
+            path = f"{prefix}{name}"
+            try:
+                member = group[name]
+            except READ_ERRORS:
+                yield path, None
+                continue
             if isinstance(member, h5py.Dataset):
                 yield path, member
             elif isinstance(member, h5py.Group) and depth < MAXIMUM_DEPTH and path not in AGAIN:

@@ -1,8 +1,11 @@
 """Rows in which a person corrected a policy, as recorders of both flag them row by row.
 
 What a policy did and what a person did instead are two answers to one observation, and who acted
-is not seen in it: the flag is a reason like any other column, and so is how much was corrected.
+is not seen in it: the flag is a reason like any other column. How much of an episode was corrected
+is none: it counts what came behind the choice.
 """
+
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,6 @@ from numpy.typing import NDArray
 from genpolicy.data.formats.source import RawEpisode, as_float
 
 TRUE, FALSE = ("true", "1", "1.0", "yes"), ("false", "0", "0.0", "no")
-SHARE = "share of the rows"
 
 
 class Interventions:
@@ -26,32 +28,39 @@ class Interventions:
         self._rows = self._corrected = self._episodes = self._with = 0
         self._by_row = False
 
-    def add(self, raw: RawEpisode) -> dict[str, float]:
-        """Count an episode.
-
-        Returns:
-            How much of it was corrected, by the name of that; nothing where it is not told by row.
-        """
+    def add(self, raw: RawEpisode) -> None:
+        """Count an episode."""
         flags = flags_of(raw.columns[self._column]) if self._column in raw.columns else None
         if flags is None or self._column is None or not np.isfinite(flags).any():
-            return {}
+            return
         known = flags[np.isfinite(flags)]
         self._episodes += 1
         self._rows += len(known)
         self._corrected += int(known.sum())
         self._with += bool(known.any())
         self._by_row |= bool(known.min() != known.max())
-        return {f"{self._column} ({SHARE})": float(known.mean())}
 
-    def notes(self) -> list[str]:
-        """What the flags say, where they change inside episodes."""
+    def notes(self, asked: Collection[str]) -> list[str]:
+        """What the flags say, where they change inside episodes.
+
+        Args:
+            asked: The columns that are asked as reasons.
+        """
         if not self._by_row:
             return []
         return [
             f"{self._column} says where a person corrected: {self._corrected / self._rows:.0%} of "
-            f"the rows, in {self._with} of {self._episodes} episodes. It is asked as a reason, "
-            "and so is its share of an episode."
+            f"the rows, in {self._with} of {self._episodes} episodes."
+            + (" It is asked as a reason." if self._column in asked else "")
         ]
+
+
+def flags_in(raw: RawEpisode, column: str | None) -> NDArray[np.float64] | None:
+    """The flags of an episode, by row or one for all of it; None where it has none."""
+    if column in raw.columns:
+        return flags_of(raw.columns[column])
+    said = raw.attributes.get(column) if column is not None else None
+    return None if said is None else flags_of(np.array([said], dtype=object))
 
 
 def flags_of(values: NDArray[np.generic]) -> NDArray[np.float64] | None:

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from genpolicy.data.formats.units import tokens
+
 MAXIMUM_TEXT = 200
 # Larger objects are models and states of a simulator.
 MAXIMUM_OBJECT = 1 << 20
@@ -21,6 +23,13 @@ MAXIMUM_DEPTH, MAXIMUM_LEAVES = 3, 256
 # As wide as the embedding of a sentence; more is a picture.
 WIDEST = 1024
 DIGEST = 12
+# Keys that say of a part of an episode where it begins and ends.
+WHEN = {
+    *("frame", "frames", "row", "rows", "start", "end", "begin", "stop", "from", "to"),
+    *("time", "timestamp", "duration"),
+}
+SPANS = "\0spans"
+"""Stands for a list of parts of an episode, which says what was done and when: no reason."""
 Vector = tuple[float, ...]
 
 
@@ -37,8 +46,9 @@ def leaves(name: str, text: str) -> dict[str, str]:
     Returns:
         The first 200 letters of texts by name; of an object at most 256 parts, in the order of
         their names, and nothing of what is empty. A list of one is what it holds, one of texts is
-        one text, one of numbers (at most 1024) its JSON, whole, for `vector_of`. Any other list
-        and what is deeper is its JSON, told apart by its digest where it is longer than 200.
+        one text, one of numbers (at most 1024) its JSON, whole, for `vector_of`; one of parts of
+        the episode, with the frames at which they begin or end, is `SPANS`. Any other list and
+        what is deeper is its JSON, told apart by its digest where it is longer than 200.
     """
     found = _document(text)
     if found is None:
@@ -110,8 +120,28 @@ def _parts(name: str, value: Any, depth: int) -> Iterator[tuple[str, str]]:
         yield name, json.dumps(value)
     elif isinstance(value, list) and value and all(isinstance(item, str) for item in value):
         yield name, cut(", ".join(value))
+    elif _tells_when(value, depth):
+        yield name, SPANS
     elif value is not None and value != []:
         yield name, cut(json.dumps(value))
+
+
+def _tells_when(value: Any, depth: int) -> bool:
+    """Whether a list holds mappings that say where in the episode each belongs, or is in one."""
+    if depth > 2 * MAXIMUM_DEPTH:
+        return False
+    if isinstance(value, list):
+        return any(_is_span(item) or _tells_when(item, depth + 1) for item in value)
+    if isinstance(value, dict):
+        return any(_tells_when(item, depth + 1) for item in value.values())
+    return False
+
+
+def _is_span(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    places = [key for key, place in value.items() if isinstance(place, int | float)]
+    return any(WHEN & {*tokens(str(key))} for key in places)
 
 
 def _is_vector(value: list[Any]) -> bool:

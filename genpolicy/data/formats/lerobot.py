@@ -36,7 +36,7 @@ from genpolicy.data.formats.source import (
     refusal_of,
     refuse,
 )
-from genpolicy.data.formats.tables import Table, open_table, read_columns
+from genpolicy.data.formats.tables import Table, described, open_table, read_columns
 from genpolicy.errors import BadInputError
 
 EPISODE, FRAME, INDEX, TASK = "episode_index", "frame_index", "index", "task_index"
@@ -70,9 +70,9 @@ class LeRobotDataset:
         if not self._files:
             refuse(str(path), "without a data file", "files named by its template")
         first = self._files[0][1]
-        with open_table(first, label=self._label(first), hashed=False) as table:
-            stored = dict(table.columns)
-            strange = [name for name in table.skipped if name not in self._info.skipped]
+        table = described([(first, self._label(first))])
+        stored = dict(table.columns)
+        strange = [name for name in table.skipped if name not in self._info.skipped]
         if strange:
             notes.append(f"Not read: {', '.join(strange)} (neither numbers nor text).")
         self.columns = self._columns(stored, notes)
@@ -115,7 +115,7 @@ class LeRobotDataset:
         if table.rows > MAXIMUM_EPISODE_ROWS:
             refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
         read = reading(table, self._needed(table, asked[0]), asked[1], rows=table.rows)
-        columns = read_columns(table, read.names, read.beside)
+        columns = read_columns(table, read.names, read.beside, read.left)
         yield self._raw((table, read), number, columns, table.label, done)
         return table.rows
 
@@ -125,7 +125,7 @@ class LeRobotDataset:
         """A file of several episodes, one after the other."""
         segments = find_segments(table, EPISODE)
         read = reading(table, self._needed(table, asked[0]), asked[1], rows=longest(segments))
-        for segment, columns in episodes_of(table, segments, read.names, read.beside):
+        for segment, columns in episodes_of(table, segments, read.names, read.beside, read.left):
             if isinstance(columns, Refusal):
                 yield columns
                 seen |= {int(segment.key)} if segment.key.isdigit() else set()

@@ -27,7 +27,7 @@ from genpolicy.data.formats.source import (
     refusal_of,
     refuse,
 )
-from genpolicy.data.formats.tables import Table, open_table, read_columns
+from genpolicy.data.formats.tables import Table, described, open_table, read_columns
 from genpolicy.errors import BadInputError
 
 UUID_COLUMN = "uuid"
@@ -100,16 +100,10 @@ class ParquetFiles:
         kinds = Counter(names.values())
         having = Counter(name for found in names.values() for name in found)
         rank = {kind: (not kind, -kinds[kind], len(kind), kind) for kind in kinds}
-        first: BadInputError | None = None
-        for path in sorted(self._files, key=lambda path: rank[names[path]]):
-            try:
-                label = path.relative_to(self._root).as_posix()
-                with open_table(path, label=label, hashed=False) as table:
-                    many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
-                    return replace(table, columns=many or table.columns)
-            except BadInputError as error:
-                first = first or error
-        raise first or AssertionError("no file was tried")
+        ranked = sorted(self._files, key=lambda path: rank[names[path]])
+        table = described([(path, path.relative_to(self._root).as_posix()) for path in ranked])
+        many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
+        return replace(table, columns=many or table.columns)
 
     def _of(
         self, table: Table, wanted: Sequence[str], episode: str | None, also: Also, done: int
@@ -120,7 +114,7 @@ class ParquetFiles:
             if table.rows > MAXIMUM_EPISODE_ROWS:
                 refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
             read = reading(table, wanted, also, rows=table.rows)
-            columns = read_columns(table, read.names, read.beside)
+            columns = read_columns(table, read.names, read.beside, read.left)
             check_columns(columns, label=table.label, known=self._known(table, read))
             yield RawEpisode(table.label, table.digest, columns, first_row=done, left=read.left)
             return table.rows
@@ -131,7 +125,7 @@ class ParquetFiles:
         )
         read = reading(table, wanted, also, rows=longest(segments))
         known = self._known(table, read)
-        for segment, found in episodes_of(table, segments, read.names, read.beside):
+        for segment, found in episodes_of(table, segments, read.names, read.beside, read.left):
             if isinstance(found, Refusal):
                 yield found
                 continue

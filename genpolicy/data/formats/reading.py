@@ -6,7 +6,7 @@ What is read beside must refuse no episode and fill no memory: nothing depends o
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from genpolicy.data.formats.source import TOO_LARGE, Also, is_large
+from genpolicy.data.formats.source import TOO_LARGE, Also, Budget, bytes_of
 from genpolicy.data.formats.tables import Table
 
 
@@ -36,6 +36,9 @@ def reading(table: Table, needed: Sequence[str], also: Also, *, rows: int) -> Re
     """
     names = list(dict.fromkeys(needed))
     more = [c for c in table.columns.values() if c.name not in names and also(c)]
-    left = {c.name: TOO_LARGE for c in more if is_large(c, rows)}
+    budget = Budget()
+    # The smallest first, so that as many as can be are read.
+    ranked = sorted(more, key=lambda column: (bytes_of(column, rows), column.name))
+    left = {c.name: TOO_LARGE for c in ranked if not budget.takes(bytes_of(c, rows))}
     beside = [c.name for c in more if c.name not in left]
     return Reading([*names, *beside], frozenset(beside), left)

@@ -1,7 +1,7 @@
 """Which columns of the recordings may be the reason, and their values by episode.
 
 Everything that the contract uses for nothing else, and that holds for a while: a value that
-changes from row to row is a signal, and what counts rows or judges the episode is no reason.
+changes from row to row is a signal, and what counts rows or comes of the episode is no reason.
 Whatever is left out is noted by its name.
 """
 
@@ -11,52 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.data.formats.consequences import counts_rows, may_be_reason
 from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.interventions import Interventions
-from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, WIDEST, leaves, vector_of
+from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, SPANS, WIDEST, leaves, vector_of
 from genpolicy.data.formats.source import Column, RawEpisode
-from genpolicy.data.formats.units import tokens
-from genpolicy.data.formats.vectors import Vectors, starts_of
+from genpolicy.data.formats.vectors import MOST_DIFFERENT, Vectors, starts_of
 from genpolicy.data.variables import Recorded, Runs, runs_of, varying
 
-# What counts rows, episodes or files, and what comes of an episode instead of before it.
-COUNTERS = {
-    *("index", "frame_index", "step_index", "episode_index", "frame", "step", "timestamp"),
-    *("episode_uuid", "num_samples", "rows", "n_rows", "chunk_index", "file_index"),
-}
-JUDGES = {
-    *("reward", "rewards", "done", "dones", "terminal", "terminals", "terminated", "truncated"),
-    *("success", "succeeded", "outcome", "discount"),
-}
-"""Words of what comes of an episode, wherever they end a name (`is_success`, `next.done`)."""
-MEASURES = {"return", "returns", "score", "length", "duration", "mask", "next"}
-"""Words that are one only by themselves: the length of a tool decides, that of an episode not."""
-OF_AN_EPISODE = {
-    *("episode", "episodes", "ep", "traj", "trajectory", "step", "steps", "action", "actions"),
-    *("total", "sum", "mean", "max", "min", "cumulative", "final", "rate", "is", "was", "per"),
-    *("valid", "pad", "padding", "attention", "loss", "sparse", "dense", "shaped", "env"),
-}
-"""Words that say nothing else beside one of these."""
-ENDS = {("from", "index"), ("to", "index")}
-FLAGS = ("is_first", "is_last", "is_terminal")
 # A value must hold this many rows on average; less is a signal.
 SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+# Of one observed column that the contract reads in part.
+MOST_ELEMENTS = 64
+PARTS = "says what was done and when"
 UNEVEN = "no numbers in an episode, or rows of different widths"
-
-
-def may_be_reason(name: str) -> bool:
-    """Whether a column of this name may be why demonstrations differ."""
-    words = tokens(name)
-    plain = name.lower().removeprefix("observation.")
-    if plain in COUNTERS or plain in FLAGS or tuple(words[-2:]) in ENDS:
-        return False
-    if JUDGES & {*words[-1:]}:
-        return False
-    plainly = all(word in JUDGES | MEASURES | OF_AN_EPISODE or word.isdigit() for word in words)
-    return not (plainly and (JUDGES | MEASURES) & {*words})
 
 
 class Reasons:
@@ -82,12 +53,16 @@ class Reasons:
         self._flickering: dict[str, int] = {}
         self._judging: set[str] = set()
         self._many: set[str] = set()
+        self._cut: set[str] = set()
         self._left: dict[str, set[str]] = {}
 
     def wants(self, column: Column) -> bool:
         """Whether the values of a column are to be read."""
         name = column.name
-        if name in self._used or not may_be_reason(name):
+        if name in self._used:
+            return False
+        if not may_be_reason(name):
+            self._judging.add(name)
             return False
         return column.width is None or column.width <= WIDEST
 
@@ -110,8 +85,7 @@ class Reasons:
         for name, text in raw.attributes.items():
             if name not in raw.columns and self.wants(Column(name, None)):
                 self._keep(name, text, uuid)
-        for name, share in self._interventions.add(raw).items():
-            self._runs.setdefault(name, {})[uuid] = Runs((0,), (share,))
+        self._interventions.add(raw)
 
     def _with_elements(
         self, columns: Mapping[str, NDArray[Any]]
@@ -120,9 +94,11 @@ class Reasons:
         for name, values in columns.items():
             yield name, values
             if name in self._partly and values.ndim == 2 and values.shape[1] <= WIDEST:
-                for k in range(values.shape[1]):
-                    if (name, k) not in self._elements:
-                        yield f"{name}[{k}]", values[:, k]
+                others = [k for k in range(values.shape[1]) if (name, k) not in self._elements]
+                if len(others) > MOST_ELEMENTS:
+                    self._cut.add(name)
+                for k in others[:MOST_ELEMENTS]:
+                    yield f"{name}[{k}]", values[:, k]
 
     def _add_runs(self, name: str, values: NDArray[Any], uuid: str) -> None:
         runs = runs_of(values)
@@ -135,8 +111,7 @@ class Reasons:
             return
         starts = starts_of(values)
         if self._holds(name, len(starts), len(values)):
-            rows = [tuple(row) for row in values[starts].astype(np.float64).tolist()]
-            self._vectors.add(name, uuid, starts.tolist(), rows)
+            self._vectors.add(name, uuid, starts, values[starts])
 
     def _holds(self, name: str, runs: int, rows: int) -> bool:
         """Whether values hold for a while in an episode; else it is counted."""
@@ -151,9 +126,11 @@ class Reasons:
             self._many.add(name)
         for part, said in parts.items():
             if part != name and not self.wants(Column(part, None)):
-                self._judging.add(part)
+                continue
+            if said == SPANS:
+                self._left.setdefault(PARTS, set()).add(part)
             elif (numbers := vector_of(said)) is not None:
-                self._vectors.add(part, uuid, [0], [numbers])
+                self._vectors.add(part, uuid, np.zeros(1), np.array([numbers]))
             else:
                 self._runs.setdefault(part, {})[uuid] = Runs((0,), (said,))
 
@@ -175,16 +152,21 @@ class Reasons:
         wide = [c.name for c in unread if c.width is not None and c.width > WIDEST]
         signals = [name for name in sorted(self._flickering) if self._is_signal(name)]
         judging = [c.name for c in unread if not may_be_reason(c.name)]
+        judging += sorted(self._judging - {*judging})
+        # That rows and files have numbers is no news.
+        judging = [name for name in judging if not counts_rows(name)]
         for names, why in (
             (wide, f"more than {WIDEST} numbers wide"),
             (signals, "changes row by row"),
-            ([*judging, *sorted(self._judging - {*judging})], "counts rows or judges the episode"),
+            (judging, "counts rows or comes of the episode"),
+            (sorted(self._cut), f"all but the first {MOST_ELEMENTS} numbers that are not observed"),
+            (self._vectors.overfull(), f"more than {MOST_DIFFERENT} different rows"),
             (sorted(self._many), f"all but the first {MAXIMUM_LEAVES} of its parts"),
             *((sorted(names), why) for why, names in sorted(self._left.items())),
         ):
             if names:
                 notes.append(f"Not looked at as a reason, {why}: {_listed(names)}.")
-        return notes + self._interventions.notes()
+        return notes + self._interventions.notes(self.recorded())
 
     def _is_signal(self, name: str) -> bool:
         return self._flickering.get(name, 0) > FLICKERING_SHARE * self._episodes

@@ -24,6 +24,7 @@ from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.detect import only_hdf5
 from genpolicy.data.formats.hdf5_single import (
+    READ_ERRORS,
     REWRITE,
     attributes_of,
     check_storage,
@@ -51,7 +52,6 @@ ACTIONS = "actions"
 PER_ROW = ("actions", "rewards", "dones")
 MAXIMUM_ATTRIBUTE = 1 << 20
 HASH_BYTES = 1 << 20
-READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
 
 
 class RobomimicFile:

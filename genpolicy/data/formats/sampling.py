@@ -13,7 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from genpolicy.data.assemble import Refusal
+from genpolicy.data.formats.columns import GUESSED
 from genpolicy.data.formats.contract import Labels
+from genpolicy.data.formats.interventions import flags_in
 from genpolicy.data.formats.source import Column, RawEpisode, Source, as_float
 from genpolicy.data.formats.units import tokens
 
@@ -102,7 +104,13 @@ def settled(labels: Labels, sample: Sequence[RawEpisode], notes: list[str]) -> L
     """The labels without those whose value switches inside episodes: they are values by row.
 
     One episode in which a label changes is damaged; if it is a quarter of them, they mean it so.
+    A name that need not mean interventions (`takeover`) is their label only where it holds flags.
     """
+    name = labels.is_intervention
+    guessed = name is not None and name.lower() in GUESSED
+    if guessed and any(flags_in(episode, name) is None for episode in sample):
+        notes.append(f"{name} holds no flags: it is a column, not the label of interventions.")
+        labels = labels.model_copy(update={"is_intervention": None})
     unsettled = {
         label: column
         for label in SETTLED

@@ -73,7 +73,11 @@ def longest(segments: Sequence[Segment]) -> int:
 
 
 def episodes_of(
-    table: Table, segments: Sequence[Segment], wanted: Sequence[str], beside: Collection[str] = ()
+    table: Table,
+    segments: Sequence[Segment],
+    wanted: Sequence[str],
+    beside: Collection[str] = (),
+    left: dict[str, str] | None = None,
 ) -> Iterator[tuple[Segment, dict[str, NDArray[Any]] | Refusal]]:
     """Each episode with its columns; one in two places, too long or unreadable is a refusal.
 
@@ -82,9 +86,10 @@ def episodes_of(
         segments: The episodes, in order.
         wanted: Names of columns.
         beside: Those of them that nothing depends on.
+        left: Gets those of them that are damaged, and why.
     """
     places = Counter(segment.key for segment in segments)
-    reader = batches(table, wanted, beside)
+    reader = batches(table, wanted, beside, left)
     rows = _Rows(reader)
     refused: set[str] = set()
     broken: Refusal | None = None

@@ -18,9 +18,10 @@ from genpolicy.errors import BadInputError, ContractError
 MAXIMUM_EPISODE_ROWS = 1_000_000
 MAXIMUM_SOURCE_ROWS = 50_000_000
 MAXIMUM_VALUE_BYTES = 2 << 30
-# What nothing depends on is read beside the rest where an episode of it is no larger.
+# What nothing depends on is read beside the rest as long as all of an episode is no larger.
 MAXIMUM_BESIDE_BYTES = 128 << 20
-TOO_LARGE = f"an episode of it is larger than {MAXIMUM_BESIDE_BYTES >> 20} MiB"
+TOO_LARGE = f"beside the others more than {MAXIMUM_BESIDE_BYTES >> 20} MiB an episode"
+NOT_READABLE = "not readable"
 ACTION = "Correct the recording, or leave this episode out."
 
 Progress = Callable[[int, int | None], None]
@@ -129,9 +130,23 @@ class Source(Protocol):
         ...
 
 
-def is_large(column: Column, rows: int) -> bool:
-    """Whether so many rows of a column are too many to read where nothing depends on it."""
-    return column.width is not None and 8 * rows * column.width > MAXIMUM_BESIDE_BYTES
+class Budget:
+    """Bytes that may still be read of an episode of what nothing depends on."""
+
+    def __init__(self) -> None:
+        """Nothing is taken yet."""
+        self._left = MAXIMUM_BESIDE_BYTES
+
+    def takes(self, size: int) -> bool:
+        """Whether so many bytes more are few enough; then they are taken."""
+        fits = size <= self._left
+        self._left -= size if fits else 0
+        return fits
+
+
+def bytes_of(column: Column, rows: int) -> int:
+    """Bytes of so many rows of a column, whose texts are taken for short ones."""
+    return 8 * rows * (1 if column.width is None else column.width)
 
 
 def refusal_of(label: str, error: BadInputError) -> Refusal:

@@ -19,10 +19,12 @@ from genpolicy.data.formats.contract import MAXIMUM_WIDTH
 from genpolicy.data.formats.source import (
     MAXIMUM_SOURCE_ROWS,
     MAXIMUM_VALUE_BYTES,
+    NOT_READABLE,
     Column,
     refuse,
 )
-from genpolicy.errors import IntegrityError
+from genpolicy.data.formats.values import array_of, is_even, missing
+from genpolicy.errors import BadInputError, IntegrityError
 
 BATCH_ROWS = 4096
 HASH_BYTES = 1 << 20
@@ -55,7 +57,9 @@ class Table:
 
 
 @contextmanager
-def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table]:
+def open_table(
+    path: Path, *, label: str, hashed: bool = True, lenient: bool = False
+) -> Iterator[Table]:
     """A Parquet file, opened without following a link; bytes hashed are the bytes read.
 
     Its footer is read once before: what claims too much, or is no table, is never hashed.
@@ -64,6 +68,7 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
         path: The file.
         label: What texts call it.
         hashed: Off only where it is described and not read; the digest is empty then.
+        lenient: Describe it although the first row of a list cannot be read, as reading it does.
 
     Raises:
         BadInputError: Missing, a link, not Parquet, or larger in memory than the caps.
@@ -75,7 +80,9 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
             kinds = _kinds(file)
             _check_size(file, label)
             columns = {
-                name: _column(file, name, kind) for name, kind in kinds.items() if kind is not None
+                name: _column(file, name, kind, lenient=hashed or lenient)
+                for name, kind in kinds.items()
+                if kind is not None
             }
         except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
             raise _unreadable(label, error) from error
@@ -83,15 +90,40 @@ def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table
         yield Table(label, digest, file, columns, skipped)
 
 
+def described(files: Sequence[tuple[Path, str]]) -> Table:
+    """The first of some files that can be described, closed; one with a damaged list comes last.
+
+    Args:
+        files: Files with what texts call them, the likeliest first.
+
+    Raises:
+        BadInputError: What is wrong with the first, where none can be described.
+    """
+    first: BadInputError | None = None
+    for lenient in (False, True):
+        for path, label in files:
+            try:
+                with open_table(path, label=label, hashed=False, lenient=lenient) as table:
+                    return table
+            except BadInputError as error:
+                first = first or error
+    raise first or AssertionError("no file was tried")
+
+
 def batches(
-    table: Table, wanted: Sequence[str], beside: Collection[str] = ()
+    table: Table,
+    wanted: Sequence[str],
+    beside: Collection[str] = (),
+    left: dict[str, str] | None = None,
 ) -> Iterator[dict[str, NDArray[Any]]]:
     """The wanted columns, some thousand rows at a time, in the order of the file.
 
     Args:
         table: The file.
         wanted: Names of columns.
-        beside: Those of them that nothing depends on: NaN where the rows of one differ in width.
+        beside: Those of them that nothing depends on: missing where the rows of one differ in
+            width, or where it is damaged.
+        left: Gets those of them that are damaged, and why.
 
     Raises:
         BadInputError: A column is missing, its rows differ in width, or a page is damaged.
@@ -100,32 +132,81 @@ def batches(
         if name not in table.columns:
             refuse(f"{table.label}: column {name}", "missing", f"{sorted(table.columns)[:12]}")
     done = 0
+    # Group by group: a damaged one must not take down the good rows before it.
+    for group in range(table.file.metadata.num_row_groups):
+        first = done
+        try:
+            for batch in _of_group(table, group, wanted, beside, done):
+                done += len(next(iter(batch.values())))
+                yield batch
+        except BadInputError:
+            damaged = {name for name in beside if not _is_whole(table, group, name)}
+            if not damaged:
+                raise
+            if left is not None:
+                left |= dict.fromkeys(sorted(damaged), NOT_READABLE)
+            yield from _without(table, group, wanted, (beside, damaged), (first, done))
+            done = first + int(table.file.metadata.row_group(group).num_rows)
+
+
+def _of_group(
+    table: Table, group: int, wanted: Sequence[str], beside: Collection[str], done: int
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """The columns of one group of rows; `done` rows lie before it or were read of it."""
     try:
-        # Group by group: a damaged one must not take down the good rows before it.
-        for group in range(table.file.metadata.num_row_groups):
-            for batch in table.file.iter_batches(
-                batch_size=BATCH_ROWS, columns=list(wanted), row_groups=[group]
-            ):
-                yield {
-                    name: _missing(batch.column(name), table.columns[name])
-                    if name in beside and not _is_even(batch.column(name), table.columns[name])
-                    else _array(batch.column(name), table.columns[name], table.label, done)
-                    for name in wanted
-                }
-                done += batch.num_rows
-    except (pa.ArrowException, OSError, MemoryError) as error:
+        for batch in table.file.iter_batches(
+            batch_size=BATCH_ROWS, columns=list(wanted), row_groups=[group]
+        ):
+            yield {
+                name: missing(batch.num_rows, table.columns[name])
+                if name in beside and not is_even(batch.column(name), table.columns[name])
+                else array_of(batch.column(name), table.columns[name], table.label, done)
+                for name in wanted
+            }
+            done += batch.num_rows
+    except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
         raise _unreadable(table.label, error) from error
 
 
+def _without(
+    table: Table,
+    group: int,
+    wanted: Sequence[str],
+    beside: tuple[Collection[str], Collection[str]],
+    rows: tuple[int, int],
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """What was not yet read of a group, with the damaged columns of it missing."""
+    among, damaged = beside
+    first, done = rows
+    sound = [name for name in wanted if name not in damaged]
+    for batch in _of_group(table, group, sound, among, first):
+        length = len(next(iter(batch.values())))
+        known, first = max(0, done - first), first + length
+        if known < length:
+            filled = batch | {name: missing(length, table.columns[name]) for name in damaged}
+            yield {name: filled[name][known:] for name in wanted}
+
+
+def _is_whole(table: Table, group: int, name: str) -> bool:
+    """Whether all rows of one column of a group can be read."""
+    try:
+        return all(True for _ in _of_group(table, group, [name], [name], 0))
+    except BadInputError:
+        return False
+
+
 def read_columns(
-    table: Table, wanted: Sequence[str], beside: Collection[str] = ()
+    table: Table,
+    wanted: Sequence[str],
+    beside: Collection[str] = (),
+    left: dict[str, str] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """The wanted columns of the whole file; see `batches`.
 
     Raises:
         BadInputError: As `batches`.
     """
-    parts = list(batches(table, wanted, beside))
+    parts = list(batches(table, wanted, beside, left))
     return {
         name: np.concatenate([part[name] for part in parts]) if parts else np.zeros(0)
         for name in wanted
@@ -234,59 +315,22 @@ def _check_size(file: pq.ParquetFile, label: str) -> None:
                 refuse(f"{label}: {chunk.path_in_schema}", found, "a bounded size", SPLIT_FILE)
 
 
-def _column(file: pq.ParquetFile, name: str, kind: str) -> Column:
+def _column(file: pq.ParquetFile, name: str, kind: str, *, lenient: bool) -> Column:
     if kind != "vector":
         return Column(name, None, "text" if kind == "text" else "number")
     field = file.schema_arrow.field(name)
     unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", errors="replace")
     if pa.types.is_fixed_size_list(field.type):
         return Column(name, int(field.type.list_size), unit=unit)
-    first = next(file.iter_batches(batch_size=1, columns=[name]), None)
+    try:
+        first = next(file.iter_batches(batch_size=1, columns=[name]), None)
+    except (pa.ArrowException, OSError, MemoryError):
+        if not lenient:
+            raise
+        # Refused as damaged where it is needed; nothing may depend on it.
+        first = None
     value = first.column(0)[0].as_py() if first is not None and first.num_rows else None
     return Column(name, len(value or ()), unit=unit)
-
-
-def _array(values: pa.Array, column: Column, label: str, done: int) -> NDArray[Any]:
-    where = f"{label}: {column.name}"
-    if pa.types.is_dictionary(values.type):
-        values = values.dictionary_decode()
-    if column.kind == "text":
-        return np.array(["" if v is None else v for v in values.to_pylist()], dtype=object)
-    if column.width is None:
-        return _scalars(values)
-    if values.null_count:
-        row = done + values.is_null().to_pylist().index(True)
-        refuse(f"{where}, row {row}", "null", f"{column.width} numbers")
-    flat = values.flatten()
-    if not pa.types.is_fixed_size_list(values.type):
-        lengths = np.asarray(values.value_lengths())
-        if (lengths != column.width).any():
-            row = int(np.argmax(lengths != column.width))
-            found = f"{lengths[row]} numbers wide"
-            refuse(f"{where}, row {done + row}", found, f"{column.width}, as in the first row")
-    return _scalars(flat).reshape(len(values), column.width)
-
-
-def _is_even(values: pa.Array, column: Column) -> bool:
-    """Whether all rows of a column are of its width."""
-    if column.width is None or pa.types.is_fixed_size_list(values.type):
-        return column.width is None or values.null_count == 0
-    return not values.null_count and bool(
-        (np.asarray(values.value_lengths()) == column.width).all()
-    )
-
-
-def _missing(values: pa.Array, column: Column) -> NDArray[Any]:
-    return np.full((len(values), column.width or 0), np.nan)
-
-
-def _scalars(values: pa.Array) -> NDArray[Any]:
-    """Numbers; a null becomes NaN, which the checks refuse by row."""
-    if pa.types.is_timestamp(values.type):
-        values = values.cast(pa.timestamp("ns")).cast(pa.int64())
-    if pa.types.is_boolean(values.type):
-        values = values.cast(pa.uint8())
-    return np.asarray(values.to_numpy(zero_copy_only=False))
 
 
 def _unreadable(label: str, error: Exception) -> IntegrityError:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from genpolicy.data.formats.leaves import WIDEST, text_of
 from genpolicy.data.formats.source import (
-    MAXIMUM_BESIDE_BYTES,
+    NOT_READABLE,
     TOO_LARGE,
     Also,
+    Budget,
     Column,
-    is_large,
+    bytes_of,
 )
 from genpolicy.data.formats.zarr_arrays import (
     column_of,
@@ -32,7 +33,6 @@ from genpolicy.data.formats.zarr_arrays import (
 from genpolicy.errors import BadInputError
 
 NO_NUMBERS, OTHER_LENGTH = "no plain columns", "of another length than the episodes"
-NOT_READABLE = "not readable"
 PLACES = ("", "meta", "data", "info")
 
 
@@ -110,24 +110,32 @@ class Beside:
         self._readers: dict[str, Iterator[NDArray[Any]]] = {}
         self._values: dict[str, NDArray[Any]] = {}
         longest = int(np.max(np.diff(np.asarray(ends), prepend=0)))
+        budget = Budget()
+        sizes: dict[str, tuple[int, Path]] = {}
         for name, (column, folder) in sorted(found.by_row.items()):
             if name in read or not also(column):
                 continue
             try:
-                large = is_large(column, longest) or largest_block(folder) > MAXIMUM_BESIDE_BYTES
+                # An episode of it and the block that is decoded are in memory at once.
+                sizes[name] = bytes_of(column, longest) + largest_block(folder), folder
             except BadInputError:
                 self.left[name] = NOT_READABLE
-                continue
-            if large:
-                self.left[name] = TOO_LARGE
-            else:
-                self._readers[name] = slices(folder, ends)
-        for name, (_, folder) in sorted(found.by_episode.items()):
+        for name, (column, folder) in sorted(found.by_episode.items()):
             if name not in read and also(Column(name, None)):
-                try:
-                    self._values[name] = read_array(folder, filled=True)
-                except BadInputError:
-                    self.left[name] = NOT_READABLE
+                sizes[name] = bytes_of(column, len(ends)), folder
+        for name, (size, folder) in sorted(sizes.items(), key=lambda item: (item[1][0], item[0])):
+            if not budget.takes(size):
+                self.left[name] = TOO_LARGE
+            elif name in found.by_row:
+                self._readers[name] = slices(folder, ends)
+            else:
+                self._read(name, folder)
+
+    def _read(self, name: str, folder: Path) -> None:
+        try:
+            self._values[name] = read_array(folder, filled=True)
+        except BadInputError:
+            self.left[name] = NOT_READABLE
 
     def next(self) -> dict[str, NDArray[Any]]:
         """Values by row of the next episode."""

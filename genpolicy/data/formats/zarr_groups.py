@@ -17,12 +17,14 @@ from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.leaves import WIDEST, text_of
 from genpolicy.data.formats.source import (
+    NOT_READABLE,
     TOO_LARGE,
     Also,
+    Budget,
     Column,
     RawEpisode,
+    bytes_of,
     check_columns,
-    is_large,
     nothing,
     refusal_of,
 )
@@ -35,7 +37,7 @@ from genpolicy.data.formats.zarr_arrays import (
     read_array,
     refuse,
 )
-from genpolicy.data.formats.zarr_beside import NOT_READABLE, OTHER_LENGTH
+from genpolicy.data.formats.zarr_beside import OTHER_LENGTH
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
@@ -140,8 +142,9 @@ def _beside(
     """Columns that nothing depends on, and those that are left out and why."""
     found: dict[str, NDArray[Any]] = {}
     left: dict[str, str] = {}
-    for column in more:
-        if is_large(column, rows):
+    budget = Budget()
+    for column in sorted(more, key=lambda column: (column.width or 1, column.name)):
+        if not budget.takes(bytes_of(column, rows)):
             left[column.name] = TOO_LARGE
             continue
         try:

@@ -14,7 +14,7 @@ from genpolicy.data.formats.hdf5_single import (
     member,
     read_single,
 )
-from genpolicy.data.formats.source import TOO_LARGE
+from genpolicy.data.formats.source import NOT_READABLE, TOO_LARGE
 from genpolicy.errors import ContractError
 
 
@@ -74,15 +74,37 @@ def test_attributes_are_texts_and_a_model_is_none(demo):
     demo.attrs["goal"] = np.array([1, 0])
     demo.attrs["side"] = np.bytes_(b"left")
     demo.attrs["picture"] = np.zeros(4000)
+    demo["model"] = demo.attrs["model_file"]
+    assert read_single(demo, READ, lambda column: True).left["model"] == MODEL
     found, left = attributes_of(demo)
     assert found == {"goal": "[1, 0]", "side": "left"}
     assert left == {"model_file": MODEL, "picture": NO_VALUE}
+
+
+def test_what_is_declared_and_empty_is_named(demo):
+    demo.attrs["x"] = h5py.Empty("S1")
+    demo["note"] = h5py.Empty("f4")
+    assert attributes_of(demo) == ({}, {"x": NO_VALUE})
+    found = read_single(demo, READ, lambda column: True)
+    assert found.left == {"virtual": NO_VALUE, "note": NO_VALUE}
+
+
+def test_damage_is_named(demo):
+    demo.create_dataset("emb", data=np.ones((4, 8)), chunks=(4, 8), compression="gzip")
+    demo["emb"].id.write_direct_chunk((0, 0), b"damaged")
+    found = read_single(demo, READ, lambda column: True)
+    assert found.left == {"virtual": NO_VALUE, "emb": NOT_READABLE} and "wide" in found.by_row
 
 
 def test_what_is_too_large_to_read_beside_is_named(demo, monkeypatch):
     monkeypatch.setattr(source, "MAXIMUM_BESIDE_BYTES", 90)
     found = read_single(demo, READ, lambda column: True)
     assert "wide" not in found.by_row and found.left["wide"] == TOO_LARGE
+    demo["wider"] = np.zeros((4, 4))
+    monkeypatch.setattr(source, "MAXIMUM_BESIDE_BYTES", 24 + 96 + 127)
+    assert read_single(demo, READ, lambda column: True).left["wider"] == TOO_LARGE
+    monkeypatch.undo()
+    assert "wider" in read_single(demo, READ, lambda column: True).by_row
 
 
 def test_what_reaches_out_of_the_file_is_refused_where_it_is_needed(demo):

@@ -9,6 +9,7 @@ import pytest
 from genpolicy.data.formats.leaves import (
     MAXIMUM_LEAVES,
     MAXIMUM_TEXT,
+    SPANS,
     WIDEST,
     cut,
     holds_several,
@@ -66,6 +67,19 @@ def test_a_list_is_what_it_holds(text, said):
 @pytest.mark.parametrize("text", ["[]", "{}", '{"a": null, "b": []}'])
 def test_what_is_empty_is_nothing(text):
     assert leaves("tags", text) == {}
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [([{"start_frame": 0, "end_frame": 137, "skill": "pick"}], True),
+     ([{"text": "go", "from": 0}], True), ({"deep": [[{"t": {"x": [{"rows": 3}]}}]]}, True),
+     ([{"name": "a", "size": 3}], False), ([{"from": "left"}], False),
+     ([{"start": [0, 1]}], False)],
+)  # fmt: skip
+def test_a_list_of_parts_of_the_episode_is_told(value, told):
+    found = leaves("a", json.dumps({"b": value}))
+    assert (SPANS in found.values()) == told
+    assert all(leaves(name, text) == {name: text} for name, text in found.items() if told)
 
 
 def test_long_lists_of_numbers_stay_whole_and_other_long_lists_differ_where_they_did():

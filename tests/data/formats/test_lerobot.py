@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from genpolicy.data.dataset import load_dataset
@@ -13,6 +14,30 @@ from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.errors import BadInputError
 
 REAL = Path(__file__).parents[4] / "shared/data/g1_bottle_lerobot_v21"
+
+
+@pytest.mark.parametrize("version", ["v2", "v3"])
+@pytest.mark.parametrize("kind", ["fixed", "list", "text"])
+def test_damage_beside_the_contract_refuses_nothing(layouts, tmp_path, version, kind):
+    root = getattr(layouts, version)(tmp_path / "recordings")
+    path = sorted(root.glob("data/*/*.parquet"))[0]
+    for file in sorted(root.glob("data/*/*.parquet")):
+        rows = pq.read_table(file)
+        values = {
+            "fixed": layouts.vectors(np.ones((len(rows), 2))),
+            "list": pa.array([[1.0, 2.0]] * len(rows)),
+            "text": pa.array(["kitchen"] * len(rows)),
+        }
+        pq.write_table(rows.append_column("emb", values[kind]), file, row_group_size=30)
+    whole = bytearray(path.read_bytes())
+    metadata = pq.ParquetFile(path).metadata
+    part = metadata.row_group(0).column(metadata.num_columns - 1)
+    place = part.dictionary_page_offset or part.data_page_offset
+    whole[place : place + 30] = bytes(30)
+    path.write_bytes(whole)
+    opened = open_dataset(root, out=tmp_path / "out")
+    assert (opened.found, opened.accepted) == (6, 6)
+    assert "Not looked at as a reason, not readable: emb." in opened.notes
 
 
 @pytest.mark.parametrize("version", ["v2", "v3"])

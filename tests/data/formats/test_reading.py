@@ -29,9 +29,12 @@ def test_what_is_needed_is_read_once_and_the_rest_only_if_asked_for(table):
 
 
 def test_what_is_too_large_is_named_unless_it_is_needed(table, monkeypatch):
-    monkeypatch.setattr(source, "MAXIMUM_BESIDE_BYTES", 1599)
+    # 50 numbers a row and one.
+    monkeypatch.setattr(source, "MAXIMUM_BESIDE_BYTES", 1600 + 32)
+    assert not reading(table, ["x"], lambda column: True, rows=4).left
+    monkeypatch.setattr(source, "MAXIMUM_BESIDE_BYTES", 1600 + 31)
     read = reading(table, ["x"], lambda column: True, rows=4)
-    assert read.left == {"wide": TOO_LARGE} and "wide" not in read.names
+    assert read.left == {"wide": TOO_LARGE} and read.names == ["x", "uneven"]
     assert reading(table, ["wide"], lambda column: True, rows=4).names[:1] == ["wide"]
 
 

@@ -12,7 +12,7 @@ import zarr
 
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats.opening import open_dataset
-from genpolicy.data.formats.recorded import Reasons, may_be_reason
+from genpolicy.data.formats.recorded import MOST_ELEMENTS, Reasons
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.zarr_buffer import PUSHT
 from genpolicy.data.variables import Runs, stored
@@ -26,27 +26,6 @@ def values_of(path, tmp_path, **options):
     episodes = load_dataset(tmp_path / "out").episodes
     files = episodes["source_file"].tolist()
     return opened, {n: dict(zip(files, v, strict=True)) for n, v in stored(episodes).items()}
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["task_index", "subtask_index", "scenario", "hand", "latent", "collector", "q7_Ω", "k",
-     "next_goal", "next_target", "done_by", "rod_length", "tool_length", "return_bin", "side_mask",
-     "mask_colour", "score_sheet", "truncated_rod", "length_class", "observation.return_bin"],
-)  # fmt: skip
-def test_a_name_does_not_keep_a_column_from_being_a_reason(name):
-    assert may_be_reason(name)
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["index", "frame_index", "episode_index", "timestamp", "reward", "next.done", "next.success",
-     "dataset_from_index", "is_terminal", "success", "length", "episode_length", "is_success",
-     "sparse_reward", "cumulative_reward", "success_rate", "total_score", "ep_return", "next",
-     "next.reward", "action_mask", "pad_mask", "reward_0", "task_success", "observation.done"],
-)  # fmt: skip
-def test_what_counts_or_judges_is_no_reason(name):
-    assert not may_be_reason(name)
 
 
 def planted(number, rows=30):
@@ -288,13 +267,24 @@ def test_what_a_script_is_in_is_a_label_also_where_it_is_called_a_state(layouts,
     assert any("Taken as labels, not as observed: planner_state" in n for n in opened.notes)
 
 
+def test_only_some_of_the_numbers_of_an_observed_column_are_asked():
+    reasons = Reasons(PUSHT)  # it reads five numbers of the state
+    for uuid in "ab":
+        state = np.full((9, 5 + MOST_ELEMENTS + 2), float(uuid == "a"))
+        reasons.add(RawEpisode(uuid, "", {"state": state}), uuid)
+    assert set(reasons.recorded()) == {f"state[{k}]" for k in range(5, 5 + MOST_ELEMENTS)}
+    assert reasons.notes([]) == [
+        "Not looked at as a reason, all but the first 64 numbers that are not observed: state."
+    ]
+
+
 def test_what_is_not_kept_is_noted():
     reasons = Reasons(PUSHT)
     wide = [Column("picture", 3072), Column("state", 5), Column("latent", None)]
     assert [reasons.wants(column) for column in wide] == [False, False, True]
     assert reasons.notes([*wide, Column("next.reward", None)]) == [
         "Not looked at as a reason, more than 1024 numbers wide: picture.",
-        "Not looked at as a reason, counts rows or judges the episode: next.reward.",
+        "Not looked at as a reason, counts rows or comes of the episode: next.reward.",
     ]
     said = json.dumps({"seen": {f"k{k}": k for k in range(300)}, "success": 1})
     raw = RawEpisode(
@@ -306,7 +296,7 @@ def test_what_is_not_kept_is_noted():
     kept = reasons.recorded()
     assert "tool" in kept and not {"latent", "reward", "goal.success"} & set(kept)
     assert reasons.notes([]) == [
-        "Not looked at as a reason, counts rows or judges the episode: goal.success.",
+        "Not looked at as a reason, counts rows or comes of the episode: goal.success, reward.",
         "Not looked at as a reason, all but the first 256 of its parts: meta.",
         "Not looked at as a reason, too large: states.",
     ]

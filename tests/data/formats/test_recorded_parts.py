@@ -43,14 +43,14 @@ def said(number):
     }
 
 
-def check_said(kept):
+def check_said(kept, notes):
     sides = ["left", "right"] * 3
     assert single(kept["scene.side"]) == sides
     assert [str(v).lower() for v in single(kept["scene.lamp.on"])] == ["true", "false"] * 3
     assert single(kept["tags"]) == [f"{side}, fast" for side in sides]
     assert single(kept["goal"]) == ["0, 1", "1, 0"] * 3
-    assert len(set(single(kept["steps"]))) == 2
-    assert set(kept) == {"scene.side", "scene.lamp.on", "tags", "goal", "steps"}
+    assert set(kept) == {"scene.side", "scene.lamp.on", "tags", "goal"}
+    assert "says what was done and when: steps." in notes
 
 
 def test_the_list_of_a_lerobot_dataset(layouts, tmp_path):
@@ -59,7 +59,7 @@ def test_the_list_of_a_lerobot_dataset(layouts, tmp_path):
         {"episode_index": i, "length": 30, "tasks": ["push"], **said(i)} for i in range(EPISODES)
     ]
     layouts.write(root / "meta" / "episodes.jsonl", lines)
-    check_said(values_of(root, tmp_path)[0])
+    check_said(*values_of(root, tmp_path))
 
 
 def test_the_table_of_episodes_of_a_lerobot_dataset(layouts, tmp_path):
@@ -74,7 +74,7 @@ def test_the_table_of_episodes_of_a_lerobot_dataset(layouts, tmp_path):
     pq.write_table(table, path)
     kept, notes = values_of(root, tmp_path)
     assert single(kept.pop("note/side")) == ["a", "b"] * 3
-    check_said(kept)
+    check_said(kept, notes)
     assert "Not read from the list of episodes: thumbnail (no plain values)." in notes
 
 
@@ -162,6 +162,23 @@ def test_arrays_of_several_numbers_an_episode(layouts, tmp_path):
     assert "Not read: pictures (no plain columns)." in notes
     assert "Not read: limits, names (of another length than the episodes)." in notes
     assert "changes row by row: force." in notes
+
+
+def test_what_comes_of_an_episode_is_named_and_not_asked(layouts, tmp_path):
+    ends = np.random.default_rng(0).normal(size=(EPISODES, 4))
+    path = buffer(layouts, tmp_path, **{"meta/final_state": ends, "meta/lamp": np.arange(EPISODES)})
+    root = zarr.open_group(str(path), mode="a", zarr_format=2)
+    root.attrs["episode_stats"] = [{"r": float(i), "l": 30 + i} for i in range(EPISODES)]
+    root.attrs["log"] = [{"episode": {"t": i}, "side": "ab"[i % 2]} for i in range(EPISODES)]
+    kept, notes = values_of(path, tmp_path)
+    assert set(kept) == {"lamp", "log.side"}
+    assert "comes of the episode: episode_stats, final_state, log.episode.t." in notes
+
+
+@pytest.mark.parametrize("version", ["v2", "v3"])
+def test_that_rows_and_episodes_have_numbers_is_no_news(layouts, tmp_path, version):
+    notes = values_of(getattr(layouts, version)(tmp_path / "recordings"), tmp_path)[1]
+    assert "index" not in notes
 
 
 def test_what_of_a_buffer_cannot_be_read_beside_refuses_nothing(layouts, tmp_path):

@@ -54,6 +54,20 @@ def test_every_demonstration_under_its_number(file, layouts, tmp_path):
     assert len(opened.contract.pairing or {}) == 3
 
 
+def test_what_is_empty_or_damaged_beside_the_contract_refuses_nothing(file, tmp_path):
+    with h5py.File(file, "a") as out:
+        demo = out["data/demo_3"]
+        out["data/demo_0"].attrs["x"] = demo.attrs["x"] = h5py.Empty("S1")
+        demo["note"] = h5py.Empty("f4")
+        demo.create_dataset("extra/emb", data=np.ones((30, 8)), compression="gzip")
+        demo["extra/emb"].id.write_direct_chunk((0, 0), b"damaged")
+    opened = open_dataset(file, out=tmp_path / "out")
+    assert (opened.found, opened.accepted) == (12, 12)
+    notes = " ".join(opened.notes)
+    assert "not readable: extra/emb." in notes
+    assert "no plain value of a row or of the demonstration: note, x." in notes
+
+
 def test_the_only_file_of_a_folder_is_that_file(file, tmp_path):
     folder = tmp_path / "mine"
     (folder / "deeper").mkdir(parents=True)

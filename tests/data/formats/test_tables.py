@@ -30,6 +30,54 @@ def test_damage_in_the_middle_refuses_what_lies_behind(long, tmp_path):
     assert all("not a readable table" in r.reason for r in opened.refused)
 
 
+def broken(path, column, group=1):
+    """The file with a damaged page of one column."""
+    whole = bytearray(path.read_bytes())
+    metadata = pq.ParquetFile(path).metadata
+    names = [metadata.row_group(0).column(k).path_in_schema for k in range(metadata.num_columns)]
+    part = metadata.row_group(group).column([n.split(".")[0] for n in names].index(column))
+    place = part.dictionary_page_offset or part.data_page_offset
+    whole[place : place + 40] = bytes(40)
+    path.write_bytes(whole)
+
+
+@pytest.mark.parametrize("column", ["emb", "list", "note", "lamp"])
+@pytest.mark.parametrize("group", [0, 1])
+def test_damage_in_what_nothing_depends_on_is_named(layouts, tmp_path, column, group):
+    path = tmp_path / "long.parquet"
+    more = {
+        "emb": layouts.vectors(np.ones((240, 2))),
+        "list": pa.array([[float(k // 30), 1.0] for k in range(240)]),
+        "note": pa.array([f"n{k // 30}" for k in range(240)]),
+        "lamp": pa.array([k // 30 % 2 for k in range(240)]),
+    }
+    table = pa.concat_tables([rows(layouts, i) for i in range(8)])
+    for name, values in more.items():
+        table = table.append_column(name, values)
+    pq.write_table(table, path, row_group_size=70)
+    contract = open_dataset(path, out=tmp_path / "first").contract
+    chosen = contract.channels[:1]
+    contract = contract.model_copy(update={"channels": chosen, "frozen": None, "pairing": None})
+    broken(path, column, group)
+    opened = open_dataset(path, out=tmp_path / "out", contract=contract)
+    assert (opened.found, opened.accepted) == (8, 8)
+    assert f"Not looked at as a reason, not readable: {column}." in opened.notes
+
+
+def test_rows_read_before_the_damage_are_read_once(layouts, tmp_path, monkeypatch):
+    monkeypatch.setattr(tables_module, "BATCH_ROWS", 40)
+    path = tmp_path / "t.parquet"
+    table = pa.table({"x": np.arange(200), "note": [f"{k} of many" for k in range(200)]})
+    pq.write_table(table, path, use_dictionary=False, data_page_size=64, compression="none")
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"150 of many", b"\xff" * 11))
+    left = {}
+    with tables_module.open_table(path, label="t") as opened:
+        found = tables_module.read_columns(opened, ["x", "note"], {"note"}, left)
+    assert found["x"].tolist() == list(range(200)) and left == {"note": "not readable"}
+    assert found["note"][0] in ("", "0 of many") and found["note"][199] == ""
+
+
 def test_a_row_bomb_is_refused_by_what_it_claims(tmp_path, monkeypatch):
     """80 MB of numbers in 45 kB; the cap is lowered instead of the bomb made bigger."""
     count = 5_000_000

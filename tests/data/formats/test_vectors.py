@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from genpolicy.data.formats import vectors as module
 from genpolicy.data.formats.leaves import MAXIMUM_TEXT
 from genpolicy.data.formats.vectors import MOST_NUMBERS, MOST_ROWS, Vectors, starts_of
 
@@ -11,7 +12,7 @@ def gathered(rows):
     """What is made of one row of numbers an episode."""
     vectors = Vectors()
     for number, row in enumerate(rows):
-        vectors.add("goal", f"u{number}", [0], [tuple(row)])
+        vectors.add("goal", f"u{number}", np.zeros(1), np.array([row]))
     return {name: [runs[f"u{k}"].values[0] for k in range(len(rows))]
             for name, runs in vectors.recorded().items()}  # fmt: skip
 
@@ -51,6 +52,22 @@ def test_a_wide_row_is_no_measure(width):
 def test_rows_of_several_widths_are_a_category_only():
     rows = [(0.5,) * (2 + k % 3) + (float(k),) for k in range(20)]
     assert list(gathered(rows)) == ["goal"]
+
+
+@pytest.mark.parametrize("width", [MOST_NUMBERS, MOST_NUMBERS + 1])
+def test_what_is_kept_of_many_different_rows_is_bounded(monkeypatch, width):
+    monkeypatch.setattr(module, "MOST_DIFFERENT", 50)
+    rows = np.random.default_rng(0).normal(size=(90, width))
+    for few, kept, overfull in (
+        (50, {"goal"}, []), (51, set(), ["goal"]), (90, set(), ["goal"])
+    ):  # fmt: skip
+        vectors = Vectors()
+        for k in range(3):
+            vectors.add("goal", f"u{k}", np.arange(few), rows[:few])
+        found = set(vectors.recorded())
+        measures = {f"goal[{k}]" for k in range(width)} if width <= MOST_NUMBERS else set()
+        assert found == kept | measures
+        assert vectors.overfull() == (overfull if not measures else [])
 
 
 def test_what_is_missing_is_empty_and_zero_has_one_sign():
