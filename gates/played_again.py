@@ -5,6 +5,7 @@ recorded as a push pushes, and the world goes on, as in a rollout. What the cell
 itself, and what ends the rollout, is the world's.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,7 +41,8 @@ class Recorded:
     Attributes:
         labels: What it says of itself, by name.
         commands: When something was accepted, ns, and what. Each of shape (D_a,).
-        pushes: When the hand was pushed, ns, sideways by how much, N, and for how long, s.
+        pushes: When the hand was pushed, ns, sideways by how much, N, and for how long, s; in
+            their order.
         states: What was measured, by time, ns.
         outcome: How it is said to have ended.
         end_ns: When.
@@ -73,15 +75,16 @@ class Recorded:
         return round(self.end_ns / to_ns(period_s))
 
     def between_ticks(self, period_s: float) -> list[int]:
-        """When something was commanded or pushed that no tick of its own can stand for, ns."""
+        """When something was commanded or pushed that no tick can stand for, ns.
+
+        A tick commands once. It may push more than once: two pushes can fall due together.
+        """
         times = {to_ns(tick * period_s) for tick in range(self.ticks(period_s))}
-        found = []
-        for events in ([t for t, _ in self.commands], [t for t, _, _ in self.pushes]):
-            left = set(times)
-            for t in events:
-                if t not in left:
-                    found.append(t)
-                left -= {t}
+        found, left = [t for t, _, _ in self.pushes if t not in times], set(times)
+        for t, _ in self.commands:
+            if t not in left:
+                found.append(t)
+            left -= {t}
         return found
 
 
@@ -141,7 +144,9 @@ def play(
     journal = Journal("played again")
     supervisor, measured = Supervisor(execution, journal), Measured(task, world, journal)
     commands = {t: action for t, action in recorded.commands}
-    pushes = {t: push for t, *push in recorded.pushes}
+    pushes: dict[int, list[tuple[float, float]]] = defaultdict(list)
+    for t, *push in recorded.pushes:
+        pushes[t].append((push[0], push[1]))
     states: list[Mapping[str, Any]] = []
     ticks = recorded.ticks(period_s)
     for tick in range(ticks + 1):
@@ -153,8 +158,7 @@ def play(
             return Played(states, (tick, how))
         if tick == ticks:
             break
-        if (push := pushes.get(to_ns(now_s))) is not None:
-            force_n, duration_s = push
+        for force_n, duration_s in pushes.get(to_ns(now_s), ()):
             world.apply_force(np.array([0.0, force_n, 0.0]), duration_s)
         action = commands.get(to_ns(now_s))
         if action is None:
@@ -168,11 +172,9 @@ def play(
 
 
 def _ends(world: World, supervisor: Supervisor, now_s: float, *, begun: bool) -> Outcome | None:
-    """What ends a rollout at a tick, asked in the order in which the rollout asks."""
-    if begun and world.success:
-        return Outcome.SUCCESS
+    """What ends a rollout at a tick; its last period is supervised before it succeeds."""
     if supervisor.observe_collision(now_s, world.collision):
         return Outcome.COLLISION
     if supervisor.observe_force(now_s, world.contact_force_n, world.phase):
         return Outcome.FORCE_STOP
-    return None
+    return Outcome.SUCCESS if begun and world.success else None

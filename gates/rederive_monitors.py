@@ -7,6 +7,7 @@ them by rank and comparison alone.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
-from genpolicy.tasks.api import World, load_task
+from genpolicy.tasks.api import Start, World, load_task
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -97,10 +98,13 @@ def rederive_probed_outcomes(params: Mapping[str, Any], journals: Sequence[Path]
     task = load_task(section(params, "task", TaskSection).name)
     conditions = {one.name: one for one in (*setting_thresholds(settings), *judging(settings))}
 
+    @cache
+    def starts_of_kind(kind: str, count: int) -> list[Start]:
+        texts = starts_of(task, kind, root_seed=seed, count=count)
+        return [task.start_from_json(text) for text in texts]
+
     def begin(labels: Mapping[str, str]) -> World:
         one = conditions[labels["perturbation"]]
-        texts = starts_of(task, one.kind, root_seed=seed, count=one.count)
-        return world_at(task, [task.start_from_json(text) for text in texts], labels, one.probe)
+        return world_at(task, starts_of_kind(one.kind, one.count), labels, one.probe)
 
-    for path in journals:
-        play_again(cells_of("D", task, params, begin), path, OF_A_PROBE, pushed=False)
+    play_again(cells_of("D", task, params, begin), journals, OF_A_PROBE, pushed=False)
