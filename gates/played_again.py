@@ -7,7 +7,7 @@ itself, and what ends the rollout, is the world's.
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +30,36 @@ Ended = tuple[int, Outcome]
 
 POSE = ("q_rad", "tcp_m", "tcp_rotation", "gripper_m")
 """What of a measured state says where the arm is."""
+TURN = ("old", "new", "cause", "phase", "failures")
+"""What an event of recovery says."""
 FORCE = "force_n"
 """What of it says how hard something was touched in the period before, N."""
 
 
-@dataclass
+@dataclass(frozen=True)
+class Turn:
+    """Recovery goes from one state to another.
+
+    Attributes:
+        t: When, ns.
+        old: From where.
+        new: To where.
+        cause: Why.
+        phase: Phase of the task in which it began.
+        failures: Primitives that have failed.
+    """
+
+    t: int
+    old: str
+    new: str
+    cause: str
+    phase: str
+    failures: int
+
+
+@dataclass(frozen=True)
 class Recorded:
-    """What a journal says of one rollout that its world can be asked about.
+    """What a journal says of one rollout that its world, or its plan, can be asked about.
 
     Attributes:
         labels: What it says of itself, by name.
@@ -44,6 +67,8 @@ class Recorded:
         pushes: When the hand was pushed, ns, sideways by how much, N, and for how long, s; in
             their order.
         states: What was measured, by time, ns.
+        turns: Where recovery went.
+        overruns: When a term of an answer took too long, ns, and which, with what is done then.
         outcome: How it is said to have ended.
         end_ns: When.
     """
@@ -52,23 +77,29 @@ class Recorded:
     commands: list[tuple[int, Array]] = field(default_factory=list)
     pushes: list[tuple[int, float, float]] = field(default_factory=list)
     states: dict[int, Message] = field(default_factory=dict)
+    turns: list[Turn] = field(default_factory=list)
+    overruns: list[tuple[int, str]] = field(default_factory=list)
     outcome: str = ""
     end_ns: int = 0
 
-    def read(self, kind: str, payload: Message) -> None:
-        """Take an event in; of the same kind a person's and recovery's commands are."""
+    def with_event(self, kind: str, payload: Message) -> "Recorded":
+        """The same behind an event; of one kind a person's and recovery's commands are."""
+        t = payload["t"]
         if kind in ("accept", "fallback"):
-            self.commands.append((payload["t"], floats(payload["action"])))
+            self.commands.append((t, floats(payload["action"])))
         elif kind == "push":
-            self.pushes.append(
-                (payload["t"], float(payload["force_n"]), float(payload["duration_s"]))
-            )
+            self.pushes.append((t, float(payload["force_n"]), float(payload["duration_s"])))
         elif kind == "state":
-            self.states[payload["t"]] = payload
+            self.states[t] = payload
+        elif kind == "recovery":
+            self.turns.append(Turn(t, *(payload[name] for name in TURN)))
+        elif kind == "invocation" and payload["stage"] == "overrun":
+            self.overruns.append((t, str(payload["detail"])))
         elif kind == "outcome":
-            self.outcome = str(payload["outcome"])
+            return replace(self, outcome=str(payload["outcome"]))
         elif kind == "end":
-            self.end_ns = payload["t"]
+            return replace(self, end_ns=t)
+        return self
 
     def ticks(self, period_s: float) -> int:
         """How many periods it lasted."""
@@ -102,7 +133,7 @@ def recorded_rollouts(path: Path) -> dict[str, Recorded]:
         if kind == "session":
             found[name] = Recorded(dict(payload["labels"]))
         else:
-            found[name].read(kind, payload)
+            found[name] = found[name].with_event(kind, payload)
     return found
 
 

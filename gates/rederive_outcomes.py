@@ -6,7 +6,7 @@ what was recorded, tick by tick. The arm must go where its journal says, feel wh
 world must end it as it says. Most of the sample are successes: those are worth a lie. A success in
 the last moment is always asked, since that is what a timeout becomes when only its name changes.
 Of every rollout, asked or not, it is known when its outcome may come: none behind the end of the
-time, and a timeout only there.
+time, a timeout only there, and a call for a person where recovery had a reason to (`called_for`).
 
 The sample is drawn by a hash of all journals of a folder and of its table of rollouts, so that
 whoever changes one of them draws all samples anew, and all must miss at once. Whoever writes all of
@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from gates.called_for import uncalled_for
 from gates.played_again import FORCE, POSE, Played, Recorded, play, recorded_rollouts
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
@@ -37,7 +38,7 @@ from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
-from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.execution.nanoseconds import NS_PER_S, to_ns
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.seeds import stream
@@ -213,7 +214,7 @@ def _ticks(recorded: Recorded, cells: Cells) -> int:
 
 
 def _ends_in_time(cells: Cells, place: str, recorded: Recorded) -> None:
-    """One rollout, played again or not: an end that there is, no later than may be."""
+    """One rollout, played again or not: an end that there is, in time; calls have a reason."""
     gate, ticks, how = cells.gate, _ticks(recorded, cells), _how(recorded)
     if how not in (*ENDS, *ENDLESS):
         refuse(gate, f"{place}: outcome", recorded.outcome or "nothing", "an end of a rollout")
@@ -224,6 +225,9 @@ def _ends_in_time(cells: Cells, place: str, recorded: Recorded) -> None:
     if stray := recorded.between_ticks(cells.period_s):
         found = f"something at {stray[0]} ns"
         refuse(gate, f"{place}: commanded", found, "one command at most a tick, at its time")
+    if called := next(uncalled_for(recorded, cells.execution), None):
+        limit = "a silence, a late answer or a time that is over, as planned"
+        refuse(gate, f"{place}: at {called[0] / NS_PER_S:.3f} s", called[1], limit)
 
 
 def _hold(cells: Cells, place: str, recorded: Recorded) -> None:

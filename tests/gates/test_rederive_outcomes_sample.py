@@ -16,7 +16,7 @@ def test_most_of_a_sample_are_successes_and_one_in_the_last_moment_is_among_it()
         made = {f"g{n}": Recorded({}, outcome="success", end_ns=50_000_000) for n in range(good)}
         made |= {f"b{n}": Recorded({}, outcome="timeout") for n in range(bad)}
         for n in range(late):
-            made[f"g{n}"].end_ns = 100 * 50_000_000
+            made[f"g{n}"] = Recorded({}, outcome="success", end_ns=100 * 50_000_000)
         found = module._asked(made, module.OF_A_JOURNAL, np.random.default_rng(seed), cells)
         return found, sum(name.startswith("g") for name in found)
 
@@ -39,7 +39,7 @@ def test_whoever_changes_one_journal_or_the_table_draws_all_samples_anew(tmp_pat
     made = {f"s/{n}": Recorded({}, outcome="success", end_ns=50_000_000) for n in range(40)}
     monkeypatch.setattr(module, "recorded_rollouts", lambda path: made)
     monkeypatch.setattr(module, "_hold", lambda cells, place, one: held.append(place))
-    cells = SimpleNamespace(gate="D", period_s=0.05, limit_ticks=100)
+    cells = SimpleNamespace(gate="D", execution=None, period_s=0.05, limit_ticks=100)
     found = []
     for change in (None, paths[0], paths[1], tmp_path / module.ROLLOUTS):
         if change is not None:
