@@ -14,7 +14,7 @@ from typing import Any
 from gates.rederive_checked import rederive_checked
 from gates.rederive_outcomes import OF_A_PROBE, cells_of, play_again, world_at
 from gates.rederive_shadow import TaskSection
-from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
+from gates.stated import compare_keys, compare_rows, refuse, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import (
@@ -29,6 +29,7 @@ from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import Start, World, load_task
+from genpolicy.verification.attended import attended_otherwise
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -81,6 +82,11 @@ def rederive_monitors(
     planned = start_hashes(task, settings, root_seed=root_seed(params))
     named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
     compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
+    for journal in journals:
+        with readable(f"{MONITORS}/journals/{journal.name}"):
+            found = next(attended_otherwise(journal, None), None)
+        if found is not None:
+            refuse("D", journal.name, found, "nobody who comes, as planned")
     rederive_checked(root, "D", MONITORS, held_to, journals)
     rederive_probed_outcomes(params, journals)
 

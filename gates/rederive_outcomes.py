@@ -56,6 +56,8 @@ IN_CONTACT = 1e-4
 """The same from the first contact on: thirty times what 1e-7 moved it by."""
 FORCE_N = 0.1
 """Of a force, N: sixteen times what 1e-7 moved it by."""
+ROUNDED_N = 1e-6
+"""How far a journal may round a force that is on record, N."""
 EDGE_M = 1e-7
 """An outcome that so little turns over another processor may turn over too."""
 ENDS: Mapping[Outcome | None, Outcome] = {
@@ -222,6 +224,11 @@ def _ends_in_time(cells: Cells, place: str, recorded: Recorded) -> None:
     if wrong:
         limit = f"as the plan has it, whose time is over after {cells.limit_s:.3f} s"
         refuse(gate, f"{place}: ends", f"{how} after {ticks * cells.period_s:.3f} s", limit)
+    least_n = min(cells.execution.force_limit_n.values()) if how is Outcome.FORCE_STOP else 0.0
+    felt = recorded.states.get(to_ns(ticks * cells.period_s), {}).get(FORCE, 0.0)
+    if 0.0 <= felt <= least_n - ROUNDED_N:
+        limit = f"more than {least_n} N, which every phase bears"
+        refuse(gate, f"{place}: outcome", f"{how} at {felt} N", limit)
     if stray := recorded.between_ticks(cells.period_s):
         found = f"something at {stray[0]} ns"
         refuse(gate, f"{place}: commanded", found, "one command at most a tick, at its time")

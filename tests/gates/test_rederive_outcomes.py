@@ -49,10 +49,7 @@ def params():
 
 @pytest.fixture(scope="module")
 def roll_out(task):
-    """Rollouts of some starts, each under a script of its own, to the end of their time.
-
-    Layers that see nothing in the way let a script collide; what was commanded is on record.
-    """
+    """Rollouts of some starts, each under a script of its own; no layer sees what it hits."""
     checker = make_checker(
         task, FEASIBILITY, action_period_s=HORIZONS.action_period_s,
         checks=without(LAYER_CHECKS, "scene_collision", "swept_collision"),
@@ -146,6 +143,7 @@ def test_what_happened_stands(asked, condition):
     [
         (1, "success", "success after .* s, required collision after"),
         (1, "force_stop", "force_stop after .* s, required collision after"),
+        (2, "force_stop", r"force_stop at 0\.0 N, required more than [\d.]+ N, which every"),
         (1, "intervention", "intervention after .* s, required collision after"),
         (2, "success", "success after 8.000 s, required nothing of the kind"),
         (2, "assisted", "assisted after 8.000 s, required nothing of the kind"),
@@ -280,6 +278,8 @@ def test_of_every_rollout_and_not_of_a_sample_it_is_known_when_it_may_end(asked,
     monkeypatch.setattr(module, "_asked", lambda *given: [])
     with pytest.raises(RefusedError, match=r"flow/nominal/0: ends is timeout after"):
         asked(change=told_of(0, "outcome", outcome="timeout"))
+    with pytest.raises(RefusedError, match=r"flow/nominal/0: outcome is force_stop at"):
+        asked(change=told_of(0, "outcome", outcome="force_stop"))
 
 
 def test_rollouts_under_a_probe_begin_in_its_world_and_nobody_pushes_there(
