@@ -5,8 +5,9 @@ recorded as a push pushes, and the world goes on, as in a rollout. What the cell
 itself, and what ends the rollout, is the world's.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,19 +30,45 @@ Ended = tuple[int, Outcome]
 
 POSE = ("q_rad", "tcp_m", "tcp_rotation", "gripper_m")
 """What of a measured state says where the arm is."""
+TURN = ("old", "new", "cause", "phase", "failures")
+"""What an event of recovery says."""
 FORCE = "force_n"
 """What of it says how hard something was touched in the period before, N."""
 
 
-@dataclass
+@dataclass(frozen=True)
+class Turn:
+    """Recovery goes from one state to another.
+
+    Attributes:
+        t: When, ns.
+        old: From where.
+        new: To where.
+        cause: Why.
+        phase: Phase of the task in which it began.
+        failures: Primitives that have failed.
+    """
+
+    t: int
+    old: str
+    new: str
+    cause: str
+    phase: str
+    failures: int
+
+
+@dataclass(frozen=True)
 class Recorded:
-    """What a journal says of one rollout that its world can be asked about.
+    """What a journal says of one rollout that its world, or its plan, can be asked about.
 
     Attributes:
         labels: What it says of itself, by name.
         commands: When something was accepted, ns, and what. Each of shape (D_a,).
-        pushes: When the hand was pushed, ns, sideways by how much, N, and for how long, s.
+        pushes: When the hand was pushed, ns, sideways by how much, N, and for how long, s; in
+            their order.
         states: What was measured, by time, ns.
+        turns: Where recovery went.
+        overruns: When a term of an answer took too long, ns, and which, with what is done then.
         outcome: How it is said to have ended.
         end_ns: When.
     """
@@ -50,38 +77,45 @@ class Recorded:
     commands: list[tuple[int, Array]] = field(default_factory=list)
     pushes: list[tuple[int, float, float]] = field(default_factory=list)
     states: dict[int, Message] = field(default_factory=dict)
+    turns: list[Turn] = field(default_factory=list)
+    overruns: list[tuple[int, str]] = field(default_factory=list)
     outcome: str = ""
     end_ns: int = 0
 
-    def read(self, kind: str, payload: Message) -> None:
-        """Take an event in; of the same kind a person's and recovery's commands are."""
+    def with_event(self, kind: str, payload: Message) -> "Recorded":
+        """The same behind an event; of one kind a person's and recovery's commands are."""
+        t = payload["t"]
         if kind in ("accept", "fallback"):
-            self.commands.append((payload["t"], floats(payload["action"])))
+            self.commands.append((t, floats(payload["action"])))
         elif kind == "push":
-            self.pushes.append(
-                (payload["t"], float(payload["force_n"]), float(payload["duration_s"]))
-            )
+            self.pushes.append((t, float(payload["force_n"]), float(payload["duration_s"])))
         elif kind == "state":
-            self.states[payload["t"]] = payload
+            self.states[t] = payload
+        elif kind == "recovery":
+            self.turns.append(Turn(t, *(payload[name] for name in TURN)))
+        elif kind == "invocation" and payload["stage"] == "overrun":
+            self.overruns.append((t, str(payload["detail"])))
         elif kind == "outcome":
-            self.outcome = str(payload["outcome"])
+            return replace(self, outcome=str(payload["outcome"]))
         elif kind == "end":
-            self.end_ns = payload["t"]
+            return replace(self, end_ns=t)
+        return self
 
     def ticks(self, period_s: float) -> int:
         """How many periods it lasted."""
         return round(self.end_ns / to_ns(period_s))
 
     def between_ticks(self, period_s: float) -> list[int]:
-        """When something was commanded or pushed that no tick of its own can stand for, ns."""
+        """When something was commanded or pushed that no tick can stand for, ns.
+
+        A tick commands once. It may push more than once: two pushes can fall due together.
+        """
         times = {to_ns(tick * period_s) for tick in range(self.ticks(period_s))}
-        found = []
-        for events in ([t for t, _ in self.commands], [t for t, _, _ in self.pushes]):
-            left = set(times)
-            for t in events:
-                if t not in left:
-                    found.append(t)
-                left -= {t}
+        found, left = [t for t, _, _ in self.pushes if t not in times], set(times)
+        for t, _ in self.commands:
+            if t not in left:
+                found.append(t)
+            left -= {t}
         return found
 
 
@@ -99,7 +133,7 @@ def recorded_rollouts(path: Path) -> dict[str, Recorded]:
         if kind == "session":
             found[name] = Recorded(dict(payload["labels"]))
         else:
-            found[name].read(kind, payload)
+            found[name] = found[name].with_event(kind, payload)
     return found
 
 
@@ -141,7 +175,9 @@ def play(
     journal = Journal("played again")
     supervisor, measured = Supervisor(execution, journal), Measured(task, world, journal)
     commands = {t: action for t, action in recorded.commands}
-    pushes = {t: push for t, *push in recorded.pushes}
+    pushes: dict[int, list[tuple[float, float]]] = defaultdict(list)
+    for t, *push in recorded.pushes:
+        pushes[t].append((push[0], push[1]))
     states: list[Mapping[str, Any]] = []
     ticks = recorded.ticks(period_s)
     for tick in range(ticks + 1):
@@ -153,8 +189,7 @@ def play(
             return Played(states, (tick, how))
         if tick == ticks:
             break
-        if (push := pushes.get(to_ns(now_s))) is not None:
-            force_n, duration_s = push
+        for force_n, duration_s in pushes.get(to_ns(now_s), ()):
             world.apply_force(np.array([0.0, force_n, 0.0]), duration_s)
         action = commands.get(to_ns(now_s))
         if action is None:
@@ -168,11 +203,9 @@ def play(
 
 
 def _ends(world: World, supervisor: Supervisor, now_s: float, *, begun: bool) -> Outcome | None:
-    """What ends a rollout at a tick, asked in the order in which the rollout asks."""
-    if begun and world.success:
-        return Outcome.SUCCESS
+    """What ends a rollout at a tick; its last period is supervised before it succeeds."""
     if supervisor.observe_collision(now_s, world.collision):
         return Outcome.COLLISION
     if supervisor.observe_force(now_s, world.contact_force_n, world.phase):
         return Outcome.FORCE_STOP
-    return None
+    return Outcome.SUCCESS if begun and world.success else None

@@ -7,13 +7,14 @@ them by rank and comparison alone.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from gates.rederive_checked import rederive_checked
 from gates.rederive_outcomes import OF_A_PROBE, cells_of, play_again, world_at
 from gates.rederive_shadow import TaskSection
-from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
+from gates.stated import compare_keys, compare_rows, refuse, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import (
@@ -27,7 +28,8 @@ from genpolicy.evidence.rows.monitors import MonitorScoreRow
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
-from genpolicy.tasks.api import World, load_task
+from genpolicy.tasks.api import Start, World, load_task
+from genpolicy.verification.attended import attended_otherwise
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
@@ -80,6 +82,11 @@ def rederive_monitors(
     planned = start_hashes(task, settings, root_seed=root_seed(params))
     named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
     compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
+    for journal in journals:
+        with readable(f"{MONITORS}/journals/{journal.name}"):
+            found = next(attended_otherwise(journal, None), None)
+        if found is not None:
+            refuse("D", journal.name, found, "nobody who comes, as planned")
     rederive_checked(root, "D", MONITORS, held_to, journals)
     rederive_probed_outcomes(params, journals)
 
@@ -97,10 +104,13 @@ def rederive_probed_outcomes(params: Mapping[str, Any], journals: Sequence[Path]
     task = load_task(section(params, "task", TaskSection).name)
     conditions = {one.name: one for one in (*setting_thresholds(settings), *judging(settings))}
 
+    @cache
+    def starts_of_kind(kind: str, count: int) -> list[Start]:
+        texts = starts_of(task, kind, root_seed=seed, count=count)
+        return [task.start_from_json(text) for text in texts]
+
     def begin(labels: Mapping[str, str]) -> World:
         one = conditions[labels["perturbation"]]
-        texts = starts_of(task, one.kind, root_seed=seed, count=one.count)
-        return world_at(task, [task.start_from_json(text) for text in texts], labels, one.probe)
+        return world_at(task, starts_of_kind(one.kind, one.count), labels, one.probe)
 
-    for path in journals:
-        play_again(cells_of("D", task, params, begin), path, OF_A_PROBE, pushed=False)
+    play_again(cells_of("D", task, params, begin), journals, OF_A_PROBE, pushed=False)

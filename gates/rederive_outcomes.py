@@ -3,9 +3,16 @@
 A journal and a row that both say `success` are two sentences of whoever wrote them. Here a sample
 of rollouts is begun again where the plan begins, under the condition that it plans, and commanded
 what was recorded, tick by tick. The arm must go where its journal says, feel what it says, and the
-world must end it as it says. The sample is drawn by the hash of the journal, so that nobody who
-writes one can choose what is asked, and most of it are successes: those are worth a lie. A success
-in the last moment is always asked, since that is what a timeout becomes when only its name changes.
+world must end it as it says. Most of the sample are successes: those are worth a lie. A success in
+the last moment is always asked, since that is what a timeout becomes when only its name changes.
+Of every rollout, asked or not, it is known when its outcome may come: none behind the end of the
+time, a timeout only there, and a call for a person where recovery had a reason to (`called_for`).
+
+The sample is drawn by a hash of all journals of a folder and of its table of rollouts, so that
+whoever changes one of them draws all samples anew, and all must miss at once. Whoever writes all of
+them can still try again and again, offline, until they do: one lie among many rollouts is missed at
+once or after a few tries, and each lie more makes it more tries. What a sample cannot rule out it
+makes dear, and no more.
 
 Measured on 24 scripted rollouts, 12 of them in contact, up to 87 N, each played again 20 times
 (27 November 2026): a start or commands that are 1e-9 beside it move a state by 7e-9 before contact,
@@ -21,8 +28,8 @@ from typing import Any
 
 import numpy as np
 
+from gates.called_for import uncalled_for
 from gates.played_again import FORCE, POSE, Played, Recorded, play, recorded_rollouts
-from gates.rederive_draws import some
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import refuse, root_seed, section
@@ -31,7 +38,10 @@ from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
-from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.execution.nanoseconds import NS_PER_S, to_ns
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes, sha256_file
+from genpolicy.seeds import stream
 from genpolicy.tasks.api import NOMINAL_PROBE, Start, Task, World, WorldSettings, load_task
 from genpolicy.verification.journal_source import readable
 
@@ -46,6 +56,8 @@ IN_CONTACT = 1e-4
 """The same from the first contact on: thirty times what 1e-7 moved it by."""
 FORCE_N = 0.1
 """Of a force, N: sixteen times what 1e-7 moved it by."""
+ROUNDED_N = 1e-6
+"""How far a journal may round a force that is on record, N."""
 EDGE_M = 1e-7
 """An outcome that so little turns over another processor may turn over too."""
 ENDS: Mapping[Outcome | None, Outcome] = {
@@ -55,6 +67,11 @@ ENDS: Mapping[Outcome | None, Outcome] = {
 """What the world has to say of an outcome. The others are ends of which it knows nothing."""
 ENDLESS = (Outcome.TIMEOUT, Outcome.INTERVENTION)
 
+ROLLOUTS = "rollouts.parquet"
+"""What is said of the rollouts of a folder, beside its folder of journals."""
+
+Wrong = tuple[str, str, str]
+"""What of a rollout, what it says, and what it would have to."""
 Begin = Callable[[Mapping[str, str]], World]
 """The world of a rollout at rest where it is planned to begin, by its labels."""
 
@@ -90,7 +107,7 @@ def rederive_outcomes(params: Mapping[str, Any], journals: Sequence[Path]) -> No
 
     Raises:
         RefusedError: One did not go, feel or end as its journal says, or the journal lacks what
-            it takes to ask.
+            it takes to ask; or one that is not asked ends when none can.
         ConfigError: A section of `params.yaml` cannot be read.
         IntegrityError: A journal is missing or no regular file.
         BadInputError: A journal cannot be read.
@@ -99,8 +116,7 @@ def rederive_outcomes(params: Mapping[str, Any], journals: Sequence[Path]) -> No
     count = section(params, "stress", StressSettings).starts
     starts = matched_starts(task, root_seed=root_seed(params), count=count)
     cells = cells_of("D", task, params, lambda labels: world_at(task, starts, labels))
-    for path in journals:
-        play_again(cells, path, OF_A_JOURNAL)
+    play_again(cells, journals, OF_A_JOURNAL)
 
 
 def cells_of(gate: Gate, task: Task, params: Mapping[str, Any], begin: Begin) -> Cells:
@@ -137,13 +153,13 @@ def world_at(
     return task.make_world(starts[number], settings=settings)
 
 
-def play_again(cells: Cells, path: Path, count: int, *, pushed: bool = True) -> None:
-    """Hold a sample of a journal against what its commands do.
+def play_again(cells: Cells, journals: Sequence[Path], count: int, *, pushed: bool = True) -> None:
+    """Hold a sample of each journal against what its commands do, and of all when they end.
 
     Args:
         cells: What they are played again in.
-        path: The journal.
-        count: How many, and each success in the last moment.
+        journals: All journals of a folder, beside which their table of rollouts lies.
+        count: How many of each, and each success in the last moment.
         pushed: Whether anything may push: where it may, the pushes are held against the plan.
 
     Raises:
@@ -151,25 +167,44 @@ def play_again(cells: Cells, path: Path, count: int, *, pushed: bool = True) -> 
         IntegrityError: No regular file.
         BadInputError: A journal cannot be read.
     """
-    with readable(f"{path.parent.name}/{path.name}"):
-        rollouts = recorded_rollouts(path)
-        asked = _asked(rollouts, count, path, cells)
-    for name in asked:
-        place = f"{path.name}: {name}"
-        with readable(place):
-            if rollouts[name].pushes and not pushed:
-                refuse(cells.gate, f"{place}: pushes", "some", "none, as planned")
-            _hold(cells, place, rollouts[name])
+    salt = _salt(journals)
+    for path in journals:
+        with readable(f"{path.parent.name}/{path.name}"):
+            rollouts = recorded_rollouts(path)
+            for name, one in rollouts.items():
+                _ends_in_time(cells, f"{path.name}: {name}", one)
+            asked = _asked(rollouts, count, stream(0, "played again", path.name, salt), cells)
+        for name in asked:
+            place = f"{path.name}: {name}"
+            with readable(place):
+                if rollouts[name].pushes and not pushed:
+                    refuse(cells.gate, f"{place}: pushes", "some", "none, as planned")
+                _hold(cells, place, rollouts[name])
 
 
-def _asked(rollouts: Mapping[str, Recorded], count: int, path: Path, cells: Cells) -> list[str]:
-    """Some of a journal by its hash, two thirds of them successes where there are so many."""
+def _salt(journals: Sequence[Path]) -> str:
+    """A hash of all journals and of their table, which nothing changes without all samples."""
+    tables = {path.parent.parent / ROLLOUTS for path in journals}
+    files = [*sorted(journals), *sorted(table for table in tables if table.is_file())]
+    return sha256_bytes(canonical_json([[path.name, sha256_file(path)] for path in files]))
+
+
+def _asked(
+    rollouts: Mapping[str, Recorded], count: int, draw: np.random.Generator, cells: Cells
+) -> list[str]:
+    """Some of a journal, two thirds of them successes where there are so many."""
     ended_well = [name for name, one in rollouts.items() if ENDS.get(_how(one)) is Outcome.SUCCESS]
     others = [name for name in rollouts if name not in ended_well]
-    good = list(some(ended_well, max(count - len(others), count - count // 3), path))
+    good = _some(ended_well, max(count - len(others), count - count // 3), draw)
     late = {name for name in ended_well if _ticks(rollouts[name], cells) >= cells.limit_ticks}
-    chosen = {*good, *some(others, max(0, count - len(good)), path), *late}
+    chosen = {*good, *_some(others, max(0, count - len(good)), draw), *late}
     return [name for name in rollouts if name in chosen]
+
+
+def _some(names: Sequence[str], count: int, draw: np.random.Generator) -> list[str]:
+    """At most so many of them."""
+    chosen = draw.choice(len(names), size=min(count, len(names)), replace=False)
+    return [names[i] for i in chosen.tolist()]
 
 
 def _how(recorded: Recorded) -> Outcome | None:
@@ -180,8 +215,8 @@ def _ticks(recorded: Recorded, cells: Cells) -> int:
     return recorded.ticks(cells.period_s)
 
 
-def _hold(cells: Cells, place: str, recorded: Recorded) -> None:
-    """One rollout: it can be asked, its arm goes as stated, and its world ends it so."""
+def _ends_in_time(cells: Cells, place: str, recorded: Recorded) -> None:
+    """One rollout, played again or not: an end that there is, in time; calls have a reason."""
     gate, ticks, how = cells.gate, _ticks(recorded, cells), _how(recorded)
     if how not in (*ENDS, *ENDLESS):
         refuse(gate, f"{place}: outcome", recorded.outcome or "nothing", "an end of a rollout")
@@ -189,18 +224,43 @@ def _hold(cells: Cells, place: str, recorded: Recorded) -> None:
     if wrong:
         limit = f"as the plan has it, whose time is over after {cells.limit_s:.3f} s"
         refuse(gate, f"{place}: ends", f"{how} after {ticks * cells.period_s:.3f} s", limit)
+    least_n = min(cells.execution.force_limit_n.values()) if how is Outcome.FORCE_STOP else 0.0
+    felt = recorded.states.get(to_ns(ticks * cells.period_s), {}).get(FORCE, 0.0)
+    if 0.0 <= felt <= least_n - ROUNDED_N:
+        limit = f"more than {least_n} N, which every phase bears"
+        refuse(gate, f"{place}: outcome", f"{how} at {felt} N", limit)
     if stray := recorded.between_ticks(cells.period_s):
         found = f"something at {stray[0]} ns"
         refuse(gate, f"{place}: commanded", found, "one command at most a tick, at its time")
-    again = _played(cells, recorded)
-    _went(cells, place, recorded, again)
-    # Where so little decides another processor may decide otherwise: then either end is true.
-    if not _agrees(how, ticks, again) and not any(
-        _agrees(how, ticks, _played(cells, recorded, moved_m)) for moved_m in (EDGE_M, -EDGE_M)
-    ):
-        said = f"{how} after {ticks * cells.period_s:.3f} s"
-        limit = f"{_said(again, cells)}, to which its recorded commands lead"
-        refuse(gate, f"{place}: outcome", said, limit)
+    if called := next(uncalled_for(recorded, cells.execution), None):
+        limit = "a silence, a late answer or a time that is over, as planned"
+        refuse(gate, f"{place}: at {called[0] / NS_PER_S:.3f} s", called[1], limit)
+
+
+def _hold(cells: Cells, place: str, recorded: Recorded) -> None:
+    """One rollout: its arm goes as stated, and its world ends it so.
+
+    Where so little decides another processor may decide otherwise, and what comes behind that is
+    other, too: then one way that both goes and ends as stated is enough.
+    """
+    wrong: list[Wrong] = []
+    for moved_m in (0.0, EDGE_M, -EDGE_M):
+        found = _otherwise(cells, recorded, _played(cells, recorded, moved_m))
+        if found is None:
+            return
+        wrong.append(found)
+    what, said, limit = wrong[0]
+    refuse(cells.gate, f"{place}: {what}", said, limit)
+
+
+def _otherwise(cells: Cells, recorded: Recorded, again: Played) -> Wrong | None:
+    """What of a rollout is not as its world does it; None where nothing is."""
+    how, ticks = _how(recorded), _ticks(recorded, cells)
+    wrong = _went(cells, recorded, again)
+    if wrong is not None or _agrees(how, ticks, again):
+        return wrong
+    said = f"{how} after {ticks * cells.period_s:.3f} s"
+    return "outcome", said, f"{_said(again, cells)}, to which its recorded commands lead"
 
 
 def _played(cells: Cells, recorded: Recorded, moved_m: float = 0.0) -> Played:
@@ -210,24 +270,25 @@ def _played(cells: Cells, recorded: Recorded, moved_m: float = 0.0) -> Played:
     )  # fmt: skip
 
 
-def _went(cells: Cells, place: str, recorded: Recorded, again: Played) -> None:
-    """Every state is the one that the commands lead to, closely until something touches."""
+def _went(cells: Cells, recorded: Recorded, again: Played) -> Wrong | None:
+    """What is not the state that the commands lead to, closely until something touches."""
     touches = False
     for tick, own in enumerate(again.states):
-        when = f"{place}: measured at {tick * cells.period_s:.3f} s"
+        when = f"measured at {tick * cells.period_s:.3f} s"
         told = recorded.states.get(to_ns(tick * cells.period_s))
         if told is None:
-            refuse(cells.gate, when, "nothing", "a state at every tick")
+            return when, "nothing", "a state at every tick"
         touches = touches or own[FORCE] > 0.0
         limit = IN_CONTACT if touches else FREE
         for name in POSE:
             off = _off(told[name], own[name])
             if not off <= limit:
                 expected = f"where its recorded commands lead, within {limit:g}"
-                refuse(cells.gate, when, f"{name} up to {off:.3g} beside it", expected)
+                return when, f"{name} up to {off:.3g} beside it", expected
         if not _off(told[FORCE], own[FORCE]) <= FORCE_N:
             expected = f"{own[FORCE]} N, which its recorded commands lead to, within {FORCE_N}"
-            refuse(cells.gate, when, f"{told[FORCE]} N", expected)
+            return when, f"{told[FORCE]} N", expected
+    return None
 
 
 def _off(told: Any, own: Any) -> float:
@@ -236,10 +297,9 @@ def _off(told: Any, own: Any) -> float:
 
 
 def _agrees(how: Outcome | None, ticks: int, again: Played) -> bool:
-    """Whether the world ends it so; at the end of the time nobody asks the supervisor any more."""
+    """Whether the world ends it so; its last period is supervised like every other one."""
     if how in ENDLESS:
-        late = how is Outcome.TIMEOUT and again.ended is not None and again.ended[0] == ticks
-        return again.ended is None or (late and again.ended[1] is not Outcome.SUCCESS)
+        return again.ended is None
     return how in ENDS and again.ended == (ticks, ENDS[how])
 
 

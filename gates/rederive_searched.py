@@ -99,8 +99,7 @@ def rederive_searched_outcomes(
         text = asked[labels["method"], labels["perturbation"], number]
         return world_at(task, {number: task.start_from_json(text)}, labels)
 
-    for path in journals:
-        play_again(cells_of("E", task, params, begin), path, OF_A_PROBE)
+    play_again(cells_of("E", task, params, begin), journals, OF_A_PROBE)
 
 
 def _asked_again(

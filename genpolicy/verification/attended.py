@@ -4,6 +4,10 @@ From the call on nothing of the policy is executed or taken into the queue; the 
 executed while the person has the arm and at no other time; coming and going clears no stop, and
 goes with the state of recovery that says so; and an episode in which somebody was called is no
 success of the policy.
+
+An outcome is a word of whoever wrote it. It calls for a person only at the time at which recovery
+asks one or gives up, it is assisted only where one was called, and a stop only where the supervisor
+stopped at that time: else an episode could be ended before it succeeds, or before it is stopped.
 """
 
 import math
@@ -25,7 +29,9 @@ CALLED, DRIVEN = "intervention", "fallback"
 """Modes of the executor: somebody is called, the classical plan drives."""
 FALLBACK = "fallback"
 """Whose chunks recovery drives by where no person has the arm."""
-SUCCESS = "success"
+SUCCESS, ASSISTED = "success", "assisted"
+STOPPED_BY = {"collision": "collision", "force_stop": "force"}
+"""Outcomes that are stops, and the event of the supervisor that is each."""
 NS_PER_S = 1_000_000_000
 ROUNDING_NS = 2.0
 
@@ -37,6 +43,8 @@ class Attended:
         self._who = ""
         self._mode = "run"
         self._stopped = False
+        self._stop: tuple[int, str] | None = None
+        self._since_ns: int | None = None
         self._recovering = Recovering()
         self._methods: dict[int, str] = {}
         # What a person's coming or going, or a call, must be followed by in the same tick.
@@ -55,6 +63,7 @@ class Attended:
             yield from self._change_mode(m)
         elif kind == "supervisor":
             self._stopped = m["state"] in STOPS
+            self._stop = (m["t"], m["event"]) if self._stopped else None
             if m["event"] == "human_reset" and self._who:
                 yield "P8.reset", f"A stop is cleared while {self._who!r} has the arm."
         elif kind == "enqueue":
@@ -69,8 +78,21 @@ class Attended:
                 yield "P8.drives", f"An action of {by!r} is executed, {self._who!r} has the arm."
             elif not self._who and kind == DRIVEN and by != FALLBACK:
                 yield "P8.drives", f"An action of {by!r} is executed, who has not the arm."
-        elif kind == "outcome" and self._recovering.called and m["outcome"] == SUCCESS:
+        elif kind == "outcome":
+            yield from self._outcome(m["outcome"], m["t"])
+
+    def _outcome(self, how: str, now_ns: int) -> Iterator[Finding]:
+        """A word for which there was no reason on record at that time."""
+        called = self._recovering.called
+        if how == SUCCESS and called:
             yield "P8.success", "An episode in which a person was called counts as success."
+        elif how == ASSISTED and not called:
+            yield "P8.outcome", "An episode counts as assisted, and nobody was called."
+        elif how == CALLED and not _gives_up(self._recovering.state, self._since_ns, now_ns):
+            state = self._recovering.state
+            yield "P8.outcome", f"An episode ends for want of a person in state {state!r}."
+        elif how in STOPPED_BY and self._stop != (now_ns, STOPPED_BY[how]):
+            yield "P7.outcome", f"An episode ends by {how!r}, and no such stop is on record then."
 
     def _overdue(self, kind: str, now_ns: int) -> Iterator[Finding]:
         """What had to follow in the tick that is over."""
@@ -102,6 +124,7 @@ class Attended:
         if with_it:
             self._owed = None
         self._asked_ns = m["t"] if m["new"] == ASKED and self._mode != CALLED else None
+        self._since_ns = m["t"]
 
     def _change_mode(self, m: Message) -> Iterator[Finding]:
         if (m["old"], m["new"]) == (CALLED, DRIVEN):
@@ -114,6 +137,11 @@ class Attended:
         if m["new"] == CALLED:
             self._asked_ns = None
         self._mode = m["new"]
+
+
+def _gives_up(state: str, since_ns: int | None, now_ns: int) -> bool:
+    """Whether recovery has just come to where nothing but a person helps."""
+    return state in (ASKED, ABORTED) and since_ns == now_ns
 
 
 @dataclass(frozen=True)
@@ -133,7 +161,7 @@ class PlannedPerson:
 
 @dataclass
 class _Session:
-    """Calls, and times of coming and going, of one rollout, ns."""
+    """Calls, times of coming and going, ns, and the end of one rollout."""
 
     condition: str
     start: int
@@ -143,9 +171,17 @@ class _Session:
     came: dict[int, int] = field(default_factory=dict)
     since_ns: int = 0
     had_ns: int = 0
+    recovery: tuple[str, int | None] = (IDLE, None)
+    outcome: str = ""
+    given_up: str = ""
 
     def read(self, kind: str, m: Message) -> None:
         """Take an event in."""
+        if kind == "recovery":
+            self.recovery = (m["new"], m["t"])
+        elif kind == "outcome":
+            self.outcome = m["outcome"]
+            self.given_up = self.recovery[0] if _gives_up(*self.recovery, m["t"]) else ""
         if kind == "recovery" and m["new"] == ASKED:
             self.called.append(m["t"])
         elif (kind == "recovery" and m["old"] == ASKED) or kind == "end":
@@ -157,6 +193,12 @@ class _Session:
 
     def otherwise(self, plan: PlannedPerson | None) -> Iterator[str]:
         """What came otherwise than planned, or did not come."""
+        # Where one is planned a call is waited for: only who does not come, or gives up, ends it.
+        ends = (ABORTED,) if plan else (ASKED, ABORTED)
+        if self.outcome == CALLED and self.given_up not in ends:
+            yield "an episode ends for want of a person, whom recovery does not miss at that time"
+        if self.outcome == ASSISTED and (plan is None or not self.called):
+            yield "an outcome is assisted, and nobody was called who was planned"
         if plan is None:
             if self.came:
                 yield "a person took over, and none was planned"

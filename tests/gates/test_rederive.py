@@ -130,6 +130,7 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     told = journal.last("state")
     journal.add("state", journal.clock(0.2), {**told, "force_n": 7.5})
     outcome = "collision" if start == 0 else "timeout"
+    supervisor.observe_collision(0.2, start == 0)
     journal.add("outcome", journal.clock(0.2), {"outcome": outcome, "mode": "left"})
     executor.end_episode(0.2)
     return journal

@@ -66,6 +66,12 @@ def test_the_commands_of_every_journal_are_played_again(root, params, monkeypatc
     assert asked == [(params, sorted((root / MONITORS / "journals").glob("*.mcap")))]
 
 
+def test_nobody_comes_to_a_rollout_of_the_monitors(root, params, monkeypatch):
+    found = lambda path, plan: iter([f"{path.name} had {plan}"])  # noqa: E731
+    monkeypatch.setattr(own, "attended_otherwise", found)
+    refused(root, params, r"\.mcap had None, required nobody who comes")
+
+
 def test_nothing_written_is_nothing_to_prove(tmp_path, params):
     rederive_monitors(tmp_path, params, module._held_to(params))
 

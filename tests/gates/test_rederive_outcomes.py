@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gates import rederive_monitors as monitors
 from gates import rederive_outcomes as module
-from gates.played_again import Played, Recorded, recorded_rollouts
+from gates.played_again import Recorded, recorded_rollouts
 from gates.rederive_monitors import rederive_probed_outcomes
 from gates.rederive_outcomes import rederive_outcomes
 from gates.rederive_searched import rederive_searched_outcomes
@@ -48,10 +49,7 @@ def params():
 
 @pytest.fixture(scope="module")
 def roll_out(task):
-    """Rollouts of some starts, each under a script of its own, to the end of their time.
-
-    Layers that see nothing in the way let a script collide; what was commanded is on record.
-    """
+    """Rollouts of some starts, each under a script of its own; no layer sees what it hits."""
     checker = make_checker(
         task, FEASIBILITY, action_period_s=HORIZONS.action_period_s,
         checks=without(LAYER_CHECKS, "scene_collision", "swept_collision"),
@@ -145,6 +143,7 @@ def test_what_happened_stands(asked, condition):
     [
         (1, "success", "success after .* s, required collision after"),
         (1, "force_stop", "force_stop after .* s, required collision after"),
+        (2, "force_stop", r"force_stop at 0\.0 N, required more than [\d.]+ N, which every"),
         (1, "intervention", "intervention after .* s, required collision after"),
         (2, "success", "success after 8.000 s, required nothing of the kind"),
         (2, "assisted", "assisted after 8.000 s, required nothing of the kind"),
@@ -170,7 +169,7 @@ def test_nothing_goes_on_behind_the_end_of_the_time(asked, params, monkeypatch):
         asked()
     endless = Recorded({}, outcome="success", end_ns=1 << 62)  # counted, never played
     with pytest.raises(RefusedError, match="ends is success after"):
-        module._hold(module.cells_of("D", None, params, None), "one", endless)
+        module._ends_in_time(module.cells_of("D", None, params, None), "one", endless)
 
 
 def test_another_command_leads_elsewhere(asked):
@@ -188,8 +187,6 @@ def test_a_command_that_is_left_out_between_two_ticks_or_one_too_many_is_refused
         asked(change=at_tick(0, "accept", 40, lambda p: None))
     with pytest.raises(RefusedError, match=r"commanded is something at \d+1 ns, required one"):
         asked(late_ns=1)
-    twice = Recorded({}, commands=[(0, np.zeros(10)), (0, np.ones(10))], end_ns=50_000_000)
-    assert twice.between_ticks(0.05) == [0]
 
 
 @pytest.mark.parametrize(
@@ -238,57 +235,55 @@ def test_a_start_that_nobody_planned_is_bad_input(asked, rollouts, monkeypatch, 
 
 
 def test_what_a_tenth_of_a_micrometre_turns_over_may_be_either(asked, monkeypatch):
-    """Another processor rounds, and an end at the edge is no lie of whoever found the other."""
+    """Another processor rounds, and an end at the edge is no lie of whoever found the other.
+
+    Where it ends and what it measures part together: what belongs to another end is no excuse.
+    """
     played = module._played
 
-    def at_the_edge(cells, recorded, moved_m=0.0):
-        return replace(played(cells, recorded), ended=(7, Outcome.FORCE_STOP) if moved_m else None)
+    def either(which, apart):
+        def at_the_edge(cells, recorded, moved_m=0.0):
+            again = played(cells, recorded)
+            if which(moved_m):
+                return again
+            ended = None if apart == "ends" else again.ended
+            states = [s | {"force_n": s["force_n"] + (apart == "feels")} for s in again.states]
+            return replace(again, ended=ended, states=states)
 
-    monkeypatch.setattr(module, "_played", at_the_edge)
-    with pytest.raises(RefusedError, match="outcome is success"):
+        monkeypatch.setattr(module, "_played", at_the_edge)
         asked()
-    either = lambda cells, recorded, moved_m=0.0: (  # noqa: E731
-        played(cells, recorded) if moved_m < 0 else at_the_edge(cells, recorded, moved_m)
-    )
-    monkeypatch.setattr(module, "_played", either)
-    asked()
+
+    for apart, said in (("ends", "outcome is success"), ("feels", r"measured at 0\.000 s is 0")):
+        with pytest.raises(RefusedError, match=said):
+            either(lambda moved_m: False, apart)
+        for sign in (0, 1, -1):
+            either(lambda moved_m, sign=sign: np.sign(moved_m) == sign, apart)
 
 
-def test_at_the_end_of_the_time_nobody_asks_the_supervisor_any_more():
-    for how in (Outcome.COLLISION, Outcome.FORCE_STOP):
-        last = Played([], (5, how))
-        assert module._agrees(Outcome.TIMEOUT, 5, last)
-        assert not module._agrees(Outcome.TIMEOUT, 6, last)
-        assert not module._agrees(Outcome.INTERVENTION, 5, last)
-    assert not module._agrees(Outcome.TIMEOUT, 5, Played([], (5, Outcome.SUCCESS)))
-    assert module._agrees(Outcome.ASSISTED, 5, Played([], (5, Outcome.SUCCESS)))
+def test_the_states_of_one_way_and_the_end_of_another_are_none_of_both(asked, monkeypatch):
+    played = module._played
+
+    def parted(cells, recorded, moved_m=0.0):
+        again = played(cells, recorded)
+        if moved_m:
+            return replace(again, states=[s | {"gripper_m": 1.0} for s in again.states])
+        return replace(again, ended=None)
+
+    monkeypatch.setattr(module, "_played", parted)
+    with pytest.raises(RefusedError, match=r"outcome is success after .* nothing of the kind"):
+        asked()
 
 
-def test_most_of_a_sample_are_successes_and_one_in_the_last_moment_is_among_it(tmp_path):
-    path = tmp_path / "flow__nominal.mcap"
-    cells = SimpleNamespace(period_s=0.05, limit_ticks=100)
-
-    def chosen(good, bad, *, late=0):
-        made = {f"g{n}": Recorded({}, outcome="success", end_ns=50_000_000) for n in range(good)}
-        made |= {f"b{n}": Recorded({}, outcome="timeout") for n in range(bad)}
-        for n in range(late):
-            made[f"g{n}"].end_ns = 100 * 50_000_000
-        found = module._asked(made, module.OF_A_JOURNAL, path, cells)
-        return found, sum(name.startswith("g") for name in found)
-
-    path.write_bytes(b"1")
-    found, good = chosen(40, 40)
-    assert (len(found), good) == (6, 4)
-    assert [(len(f), g) for f, g in (chosen(40, 0), chosen(1, 40), chosen(2, 1), chosen(40, 1))] \
-        == [(6, 6), (6, 1), (3, 2), (6, 5)]  # fmt: skip
-    late, _ = chosen(40, 40, late=9)
-    assert {f"g{n}" for n in range(9)} <= set(late)
-    path.write_bytes(b"2")
-    assert chosen(40, 40)[0] != found, "its hash chooses"
+def test_of_every_rollout_and_not_of_a_sample_it_is_known_when_it_may_end(asked, monkeypatch):
+    monkeypatch.setattr(module, "_asked", lambda *given: [])
+    with pytest.raises(RefusedError, match=r"flow/nominal/0: ends is timeout after"):
+        asked(change=told_of(0, "outcome", outcome="timeout"))
+    with pytest.raises(RefusedError, match=r"flow/nominal/0: outcome is force_stop at"):
+        asked(change=told_of(0, "outcome", outcome="force_stop"))
 
 
 def test_rollouts_under_a_probe_begin_in_its_world_and_nobody_pushes_there(
-    task, roll_out, params, tmp_path
+    task, roll_out, params, tmp_path, monkeypatch
 ):
     settings = {
         "kinds": ["support"], "threshold_starts": 1, "judged_starts": 1, "probe_starts": 1,
@@ -300,7 +295,13 @@ def test_rollouts_under_a_probe_begin_in_its_world_and_nobody_pushes_there(
     made = roll_out([start], (does,), condition=PROBE, probe=PROBE)
     path = tmp_path / "flow__probe.mcap"
     write_journal(path, [one.journal for one in made])
-    rederive_probed_outcomes(watched, [path])
+    drawn = []
+    own = lambda *given, **more: drawn.append(given) or starts_of(*given, **more)  # noqa: E731
+    monkeypatch.setattr(monitors, "starts_of", own)
+    other = tmp_path / "mip__probe.mcap"
+    write_journal(other, [one.journal for one in made])
+    rederive_probed_outcomes(watched, [path, other])
+    assert len(drawn) == 1, "the starts of a kind are drawn once, not for each rollout"
     push = SidewaysPush(force_n=15.0)
     made = roll_out([start], (does,), condition=PROBE, probe=PROBE, schedule=push)
     write_journal(path, [one.journal for one in made])

@@ -5,6 +5,7 @@ import pytest
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.seeds import stream
 from genpolicy.verification.attended import Attended, PlannedPerson, attended_otherwise
+from genpolicy.verification.rollouts import derived_with_recoveries
 
 WHO = "ada"
 FELL = ("mode", {"old": "run", "new": "fallback"})
@@ -28,6 +29,11 @@ STOPPED = ("supervisor", {"event": "force", "state": "protective_stop"})
 CLEARED = ("supervisor", {"event": "human_reset", "state": "run"})
 LATER = ("observation", {"later": True})
 WON = ("outcome", {"outcome": "success"})
+NEEDED, HELPED = (("outcome", {"outcome": how}) for how in ("intervention", "assisted"))
+ABORTS = (FELL, HELD, ("recovery", {"old": "hold", "new": "retreat"}),
+          ("recovery", {"old": "retreat", "new": "abort"}), INTERVENES)  # fmt: skip
+RAMMED = ("supervisor", {"event": "collision", "state": "protective_stop"})
+COLLIDED, FORCED = (("outcome", {"outcome": how}) for how in ("collision", "force_stop"))
 OVER = ("person", {"stage": "episode_over", "who": WHO})
 END = (("mode", {"old": "fallback", "new": "ended"}), ("end", {}))
 
@@ -47,6 +53,7 @@ def test_called_come_driven_and_gone_is_in_order():
                  ("outcome", {"outcome": "assisted"})) == []  # fmt: skip
     given_up = ("person", {"stage": "gave_up", "who": WHO})
     assert rules(*begun, given_up, INTERVENES, LEAVES, LATER, ("end", {})) == []
+    assert rules(*begun, given_up, INTERVENES, LEAVES, NEEDED, LATER, ("end", {})) == []
     assert rules(*begun, OVER, *END) == []
     assert rules(*begun, STOPPED, ("recovery", {"old": "person", "new": "stopped"}), LATER,
                  OVER, *END) == []  # fmt: skip
@@ -91,6 +98,52 @@ def test_each_thing_that_may_not_be_is_found(events, rule):
     assert rules(*events) == [rule]
 
 
+@pytest.mark.parametrize(
+    "events",
+    [
+        (*CALLED, NEEDED),
+        (*ABORTS, NEEDED),
+        (*CALLED, LATER, ("recovery", {"old": "ask_human", "new": "abort"}), NEEDED),
+        (*CALLED, LATER, HELPED),
+        (RAMMED, COLLIDED),
+        (STOPPED, FORCED),
+        (*CALLED, *CAME, LATER, STOPPED, ("recovery", {"old": "person", "new": "stopped"}),
+         FORCED),
+        (WON,),
+        (("outcome", {"outcome": "timeout"}),),
+    ],
+)  # fmt: skip
+def test_an_end_for_which_there_is_a_reason_at_that_time_is_in_order(events):
+    assert rules(*events) == []
+
+
+@pytest.mark.parametrize(
+    ("events", "rule"),
+    [
+        # Nobody was called, or was long ago: what would have succeeded is cut off by a word.
+        ((NEEDED,), "P8.outcome"),
+        ((FELL, HELD, NEEDED), "P8.outcome"),
+        ((*CALLED, LATER, NEEDED), "P8.outcome"),
+        ((*ABORTS, LATER, NEEDED), "P8.outcome"),
+        ((*CALLED, *CAME, LATER, NEEDED), "P8.outcome"),
+        ((*CALLED, *CAME, LATER, *GONE, NEEDED), "P8.outcome"),
+        ((*CALLED, STOPPED, ("recovery", {"old": "ask_human", "new": "stopped"}), NEEDED),
+         "P8.outcome"),
+        ((HELPED,), "P8.outcome"),
+        ((FELL, HELD, HELPED), "P8.outcome"),
+        ((COLLIDED,), "P7.outcome"),
+        ((FORCED,), "P7.outcome"),
+        ((STOPPED, COLLIDED), "P7.outcome"),
+        ((RAMMED, FORCED), "P7.outcome"),
+        ((STOPPED, LATER, FORCED), "P7.outcome"),
+        ((STOPPED, CLEARED, FORCED), "P7.outcome"),
+        ((("supervisor", {"event": "silence", "state": "protective_stop"}), FORCED), "P7.outcome"),
+    ],
+)  # fmt: skip
+def test_an_end_without_a_reason_at_that_time_is_found(events, rule):
+    assert rules(*events) == [rule]
+
+
 @pytest.mark.parametrize("kind", ["accept", "fallback"])
 def test_of_the_policy_nothing_is_executed_while_a_person_has_the_arm(kind):
     assert "P8.drives" in rules(OF_POLICY, *CALLED, *CAME, (kind, {"arrival": 2}))
@@ -99,10 +152,12 @@ def test_of_the_policy_nothing_is_executed_while_a_person_has_the_arm(kind):
 PLAN = PlannedPerson((0.5, 1.5), 2.0, 11)
 
 
-def planned(tmp_path, *, later=0, had_ns=1_000_000_000, comes=True, waits=40, period_s=0.05):
+def planned(
+    tmp_path, *, later=0, had_ns=1_000_000_000, comes=True, waits=40, period_s=0.05, outcome=""
+):
     """A journal in which a person is called at 1 s, comes as drawn or later, and stays a while.
 
-    One that nobody comes to is aborted after so many ticks.
+    One that nobody comes to is aborted after so many ticks. An outcome follows behind that.
     """
     period_ns = round(period_s * 1e9)
     journal = Journal("r", {"perturbation": "push", "start": "4"})
@@ -118,7 +173,22 @@ def planned(tmp_path, *, later=0, had_ns=1_000_000_000, comes=True, waits=40, pe
     elif waits is not None:
         aborted = {"old": "ask_human", "new": "abort"}
         journal.add("recovery", 1_000_000_000 + waits * period_ns, asked | aborted)
+    if outcome:
+        journal.add("outcome", journal.events()[-1].t, {"outcome": outcome, "mode": ""})
     journal.add("end", 9_000_000_000, {})
+    write_journal(tmp_path / "j.mcap", [journal])
+    return tmp_path / "j.mcap"
+
+
+def ended(tmp_path, outcome, *states):
+    """A journal that ends so at 1 s, behind states of recovery at times in s."""
+    journal = Journal("r", {"perturbation": "push", "start": "4"})
+    journal.add("session", 0, {"labels": journal.labels, "period_ns": 50_000_000})
+    for time_s, old, new in states:
+        told = {"old": old, "new": new, "cause": "", "phase": "", "failures": 0}
+        journal.add("recovery", round(time_s * 1e9), told)
+    journal.add("outcome", 1_000_000_000, {"outcome": outcome, "mode": ""})
+    journal.add("end", 1_000_000_000, {})
     write_journal(tmp_path / "j.mcap", [journal])
     return tmp_path / "j.mcap"
 
@@ -148,3 +218,37 @@ def test_who_would_have_come_too_late_is_not_missed_and_a_period_need_be_no_whol
         path = planned(tmp_path, comes=False, waits=int(due_s / 0.05) + more)
         assert len(list(attended_otherwise(path, PLAN))) == found
     assert list(attended_otherwise(planned(tmp_path, period_s=1 / 30), PLAN)) == []
+
+
+@pytest.mark.parametrize(
+    ("states", "with_nobody", "with_one"),
+    [
+        ((), 1, 1),
+        (((0.9, "idle", "hold"), (0.9, "hold", "retreat")), 1, 1),
+        # Asked at that time: where nobody is planned it is over, where one is it is waited for.
+        (((0.5, "idle", "hold"), (1.0, "hold", "ask_human")), 0, 1),
+        (((0.5, "idle", "hold"), (0.95, "hold", "ask_human")), 1, 1),
+        (((0.5, "idle", "retreat"), (1.0, "retreat", "abort")), 0, 0),
+        (((0.5, "idle", "retreat"), (0.95, "retreat", "abort")), 1, 1),
+    ],
+)
+def test_an_end_for_want_of_a_person_needs_recovery_to_miss_one_then(
+    tmp_path, states, with_nobody, with_one
+):
+    path = ended(tmp_path, "intervention", *states)
+    for plan, count in ((None, with_nobody), (PLAN, with_one)):
+        found = list(attended_otherwise(path, plan))
+        assert ["whom recovery does not miss" in one for one in found] == [True] * count
+    (row,) = derived_with_recoveries(path)[0].values()
+    assert row["interventions"] >= (not with_nobody), "what stands was called, and counts"
+
+
+def test_who_gave_up_or_did_not_come_ends_it_and_an_assisted_one_had_been_called(tmp_path):
+    late = {"comes": False, "waits": 5}
+    assert list(attended_otherwise(planned(tmp_path, **late, outcome="intervention"), PLAN)) == []
+    assert list(attended_otherwise(planned(tmp_path, outcome="assisted"), PLAN)) == []
+    found = list(attended_otherwise(planned(tmp_path, outcome="assisted"), None))
+    assert any("an outcome is assisted" in one for one in found)
+    for plan in (None, PLAN):
+        (found,) = attended_otherwise(ended(tmp_path, "assisted"), plan)
+        assert "an outcome is assisted" in found
