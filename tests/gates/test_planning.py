@@ -1,5 +1,6 @@
 """What a plan can decide is what the gate would say of such rollouts."""
 
+import copy
 import dataclasses
 import json
 import math
@@ -40,7 +41,7 @@ def planned(tmp_path, monkeypatch):
         monkeypatch.setattr(planned_power, name, TRIALS)
 
     def plan(monitors=None, power=None, **changes):
-        params = read_params(ROOT)
+        params = copy.deepcopy(read_params(ROOT))  # which is read once for all
         if power is not None:
             params["rehearsal"] = True
             owners = params["gate_d"]["limits"].values()
