@@ -8,6 +8,7 @@ show, and a gain that is too small to be found leaves it with the simpler policy
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -187,7 +188,7 @@ def _bounds(settings: StressSettings, limits: Limits, table: Power) -> Iterator[
 
 def _counted(name: str, limit: float, starts: int, confidence: float) -> Bound:
     """Fewest successes or most failures of the planned starts that keep the limit."""
-    ends = [counted_interval(hits, starts, confidence=confidence) for hits in range(starts + 1)]
+    ends = _ends(starts, confidence)
     if name in FEWER:
         most = max((hits for hits, (_, high) in enumerate(ends) if high <= limit), default=None)
         none = f"none of {starts} bounds it by {ends[0][1]:.3g} only"
@@ -198,6 +199,13 @@ def _counted(name: str, limit: float, starts: int, confidence: float) -> Bound:
     none = f"{starts} of {starts} {what} show {ends[-1][0]:.3g} only"
     kept = f"from {fewest} {what} of {starts} on"
     return Bound(name, fewest is not None, none if fewest is None else kept)
+
+
+@cache
+def _ends(starts: int, confidence: float) -> tuple[tuple[float, float], ...]:
+    """Interval of each count of so many starts, from none to all."""
+    counts = range(starts + 1)
+    return tuple(counted_interval(hits, starts, confidence=confidence) for hits in counts)
 
 
 def _with_a_true_share(bound: Bound, limit: float, settings: StressSettings) -> Bound:
@@ -213,8 +221,7 @@ def _with_a_true_share(bound: Bound, limit: float, settings: StressSettings) -> 
     conditions = judged.get(bound.criterion, len(settings.perturbations))
     if not conditions:
         return bound
-    hits = np.arange(starts + 1)
-    ends = [counted_interval(int(n), starts, confidence=settings.confidence) for n in hits]
+    hits, ends = np.arange(starts + 1), _ends(starts, settings.confidence)
     kept = [high <= limit if fewer else low >= limit for low, high in ends]
     steps = np.arange(SHARES + 1) / SHARES
     often = np.sum(binom.pmf(hits[kept][:, None], starts, steps), axis=0) ** conditions

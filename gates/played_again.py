@@ -174,10 +174,10 @@ def play(
     """
     journal = Journal("played again")
     supervisor, measured = Supervisor(execution, journal), Measured(task, world, journal)
-    commands = {t: action for t, action in recorded.commands}
+    commands = dict(recorded.commands)
     pushes: dict[int, list[tuple[float, float]]] = defaultdict(list)
-    for t, *push in recorded.pushes:
-        pushes[t].append((push[0], push[1]))
+    for t, force_n, duration_s in recorded.pushes:
+        pushes[t].append((force_n, duration_s))
     states: list[Mapping[str, Any]] = []
     ticks = recorded.ticks(period_s)
     for tick in range(ticks + 1):

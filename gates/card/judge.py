@@ -38,14 +38,14 @@ from gates.card.windows import require_aborts, windows_of
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.exceptions import utc_today
+from gates.exceptions import unmatched_written, utc_today
 from gates.overriders import first_end, require_in_force
 from gates.overrides import OVERRIDES, Exceptions, exceptions_of
 from gates.pipeline import check_record
 from gates.preregistration import PREREGISTRATION, moved_caveats
 from gates.protection import require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
-from gates.reproducibility.settings import RELOAD, excepted_until
+from gates.reproducibility.settings import RELOAD
 from gates.running import require_running_code
 from gates.settings import GateSettings, read_limits, read_params, read_settings
 from gates.stress.contact import untouched
@@ -132,9 +132,9 @@ def _until(params: Mapping[str, Any], draft: TrialCard | None, exceptions: Excep
     if draft is None:
         return ""
     name = draft.candidate
-    return min(
-        filter(None, (excepted_until(params, name), first_end(exceptions.below, name))), default=""
-    )
+    own = unmatched_written(params).get(name)
+    days = own.expires if own else "", first_end(exceptions.below, name)
+    return min(filter(None, days), default="")
 
 
 def _chain_error(root: Path, chain: Chain, draft: TrialCard | None, day: datetime.date) -> str:

@@ -60,8 +60,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
             outside the workspace; or a limit is overridden by somebody who may not, or no longer.
     """
     rungs = require_judged(root)
-    # The last says which limits are overridden, and Gate B who may stay unmatched.
-    require_in_force(root, {gate: read_report(root, gate)[0] for gate in ("B", BUNDLED[-1])})
+    require_in_force(root, {gate: read_report(root, gate)[0] for gate in BUNDLED})
     groups = groups_of(root, candidate)
     checkpoint = CANDIDATES.read(root / RELOAD)[candidate].checkpoint
     statements = statements_of(root, candidate, checkpoint)

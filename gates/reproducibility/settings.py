@@ -2,14 +2,14 @@
 
 import datetime
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import Field, field_validator, model_validator
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.may_differ import PLACE, Listed
-from gates.report import Owner, StrictModel, parse_section, stage_of
-from gates.settings import CandidateSettings, section_of
+from gates.report import Owner, StrictModel
+from gates.settings import CandidateSettings
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
 RELOAD = "artifacts/reload"
@@ -169,16 +169,3 @@ def fixtures_of(evidence: Evidence, candidate: str) -> dict[int, int]:
     rows = evidence.of(SAMPLES, SampleRow, candidate)
     counted = rows.groupby("seed")["row"].nunique()
     return dict(zip(counted.index.tolist(), counted.tolist(), strict=True))
-
-
-def excepted_until(params: Mapping[str, Any], candidate: str) -> str:
-    """Last day on which a candidate may stand unmatched, YYYY-MM-DD; empty if it is matched.
-
-    Raises:
-        ConfigError: The exception is malformed, or the section is missing.
-    """
-    unmatched = section_of(params, stage_of("B")).get("unmatched")
-    if not isinstance(unmatched, dict) or candidate not in unmatched:
-        return ""
-    where = f"params.yaml: {stage_of('B')}.unmatched.{candidate}"
-    return parse_section(Unmatched, unmatched[candidate], where=where).expires

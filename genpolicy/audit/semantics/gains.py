@@ -7,6 +7,8 @@ be apart by one factor, in both halves of the way, and episodes that went alike,
 stand on both sides. Rates are not asked: a controller that clips them does the same.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
@@ -14,13 +16,12 @@ from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.clocks import LEAST_EPISODES, two_clusters
 from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.offsets import added, explained
+from genpolicy.audit.semantics.offsets import added, along, explained
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import episode_sums
+from genpolicy.audit.semantics.units import LIKE, log_gain
 from genpolicy.audit.settings import AuditSettings
 
-# Correlation with its command from which a column has a factor.
-LIKE = 0.9
 # Less is what a faster motion of the same arm falls short by.
 LEAST_FACTOR = 1.25
 # In each half of the way it is as large as in all, within this share of its logarithm.
@@ -44,7 +45,7 @@ def part_gain_findings(
     asked = asked & ~added(data, len(asked))
     alike = np.maximum(found.positive, found.negative) >= LIKE
     least = np.log(max(LEAST_FACTOR, settings.gain_epoch_floor))
-    gains = np.where(alike, _logs(found.seen, found.asked), np.nan)
+    gains = np.where(alike, log_gain(found.seen, found.asked), np.nan)
     halves = _of_halves(motion, found)
     worst: tuple[float, Flags, Flags] | None = None
     for column in np.flatnonzero(asked):
@@ -83,12 +84,6 @@ def _shared(gains: Array, size: float, chosen: Flags, others: Flags) -> bool:
     return bool(np.count_nonzero(same) >= max(2, MOST * len(same)))
 
 
-def _logs(seen: Array, asked: Array) -> Array:
-    """Logarithm of a factor; NaN where there is none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where((asked > 0) & (seen > 0), np.log(seen) - np.log(asked), np.nan)
-
-
 def _of_halves(motion: Motion, found: Following) -> Array:
     """Logarithm of each column's factor in both halves of the way of all. Shape (2, E, P)."""
     first = _first_half(found.moves[0], motion.starts)[:, None]
@@ -96,18 +91,14 @@ def _of_halves(motion: Motion, found: Following) -> Array:
     sums = (
         [episode_sums(half * power, motion.starts) for power in powers] for half in (first, ~first)
     )
-    return np.stack([_logs(seen, asked) / 2.0 for asked, seen in sums])
+    return np.stack([log_gain(seen, asked) / 2.0 for asked, seen in sums])
 
 
 def _first_half(moves: Array, starts: Integers) -> Flags:
     """Rows up to where half of the commanded motion lies behind, in spreads. Shape (N,)."""
     scale = np.std(moves, axis=0)
     pace = np.linalg.norm(moves / np.where(scale > 0, scale, np.inf), axis=1)
-    whole = episode_sums(pace, starts)
-    before = np.concatenate([[0.0], np.cumsum(whole)])[:-1]
-    lengths = np.diff(starts)
-    behind = np.cumsum(pace) - np.repeat(before, lengths)
-    return np.asarray(behind <= np.repeat(whole / 2.0, lengths))
+    return np.concatenate([along(pace[a:b]) <= 0.5 for a, b in pairwise(starts)])
 
 
 def _constant(halves: Array, chosen: Flags, others: Flags) -> bool:

@@ -142,9 +142,9 @@ def _everywhere(beside: _Beside, place: int, chosen: Flags, others: Flags) -> bo
     gaps, speeds = (np.full((len(chosen), len(PARTS)), np.nan) for _ in range(2))
     for number in np.flatnonzero(chosen | others):
         a, b = beside.starts[number : number + 2]
-        along = _along(beside.pace[a:b])
+        way = along(beside.pace[a:b])
         for k, (begin, end) in enumerate(PARTS):
-            rows = np.flatnonzero((along >= begin) & (along <= end))
+            rows = np.flatnonzero((way >= begin) & (way <= end))
             if len(rows) < LEAST_ROWS:
                 every = np.arange(b - a)
                 rows = every[:LEAST_ROWS] if end < 0.5 else every[-LEAST_ROWS:]
@@ -211,12 +211,12 @@ def _routes(values: Array, starts: Integers) -> Array:
     result = np.zeros((len(starts) - 1, PLACES * values.shape[1]))
     for number, (a, b) in enumerate(pairwise(starts)):
         if b > a:
-            rows = np.searchsorted(_along(pace[a:b]), np.linspace(0.0, 1.0, PLACES))
+            rows = np.searchsorted(along(pace[a:b]), np.linspace(0.0, 1.0, PLACES))
             result[number] = scaled[a:b][rows.clip(max=b - a - 1)].ravel()
     return result
 
 
-def _along(pace: Array) -> Array:
+def along(pace: Array) -> Array:
     """Share of the way that lies behind each row. Shape (n,)."""
     behind = np.cumsum(pace)
     return np.asarray(behind / behind[-1] if behind[-1] > 0 else np.linspace(0, 1, len(pace)))

@@ -81,7 +81,7 @@ def gain_findings(
     follows = found.follows[:, sized]
     asked = episode_deviation(motion.commanded[:, sized], motion.starts) * follows
     seen = episode_deviation(motion.observed[:, sized], motion.starts) * follows
-    gains = _log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
+    gains = log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
     findings = _epochs(data, gains, "position", settings, factors)
     findings += _episodes(data, gains, "position", settings, factors)
     return findings, np.where(np.abs(np.log(factors)) > np.log(TAKEN_OUT), factors, 1.0)
@@ -190,7 +190,7 @@ def _clear(values: Array) -> Array:
     return np.where(about_zero & small, 0.0, 1.0)
 
 
-def _log_gain(seen: Array, asked: Array) -> Array:
+def log_gain(seen: Array, asked: Array) -> Array:
     """Logarithm of the gain; NaN where nothing follows its command. Shape (E,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where((asked > 0) & (seen > 0), np.log(seen) - np.log(asked), np.nan)

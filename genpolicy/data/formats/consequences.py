@@ -15,17 +15,8 @@ COUNTERS = {
 }
 JUDGES = {
     *("reward", "rewards", "done", "dones", "terminal", "terminals", "terminated", "truncated"),
-    *(
-        "truncation",
-        "truncations",
-        "termination",
-        "terminations",
-        "success",
-        "successes",
-        "succeeded",
-        "outcome",
-        "outcomes",
-    ),
+    *("truncation", "truncations", "termination", "terminations"),
+    *("success", "successes", "succeeded", "outcome", "outcomes"),
     *("fail", "failed", "failure", "failures", "discount", "quality", "rating", "ratings"),
     *("metric", "metrics", "stats", "statistics", "result", "results"),
 }

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from genpolicy.data.formats.detect import SHOWN, contents, named_layout, refuse_unreadable
+from genpolicy.data.formats.detect import contents, listed, named_layout, refuse_unreadable
 
 ADVICE = "What they say of the episodes is not asked; write it into the recordings."
 # What belongs to a published data set as such, and says nothing of one episode.
@@ -80,5 +80,4 @@ def _is_of_all(name: str) -> bool:
 def _note(names: list[str]) -> tuple[str, ...]:
     if not names:
         return ()
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return (f"Not read, beside the recordings: {', '.join(names[:SHOWN])}{more}. {ADVICE}",)
+    return (f"Not read, beside the recordings: {listed(names)}. {ADVICE}",)
