@@ -132,7 +132,7 @@ def of_a_session(root, data, told):
     for number in order:
         state, action = parts[number]
         tables.append(pa.table({
-            "run": [f"day {told[number]}"] * len(state), "step": np.arange(len(state)),
+            "run": [f"day {told[number]}"] * len(state), "frame": np.arange(len(state)),
             **{f"state_{name}": state[:, k] for k, name in enumerate(STATE)},
             "action_x_m": action[:, 0], "action_y_m": action[:, 1],
         }))  # fmt: skip

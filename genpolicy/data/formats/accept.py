@@ -89,10 +89,13 @@ def _check_frames(raw: RawEpisode, contract: ImportContract) -> None:
     bad = np.flatnonzero(~(steps == 1.0))
     if len(bad):
         row = int(bad[0]) + 1
+        expected = "one more than the row before"
+        if steps[row - 1] < 0:
+            expected += "; where an episode begins there, a column `episode` that says so"
         refuse(
             f"{raw.label}: {name}, row {row}",
             f"{numbers[row]!s} after {numbers[row - 1]!s}",
-            "one more than the row before",
+            expected,
         )
 
 

@@ -169,6 +169,7 @@ def test_a_gap_or_a_jump_in_one_episode_is_damage_as_before(layouts, tmp_path):
     opened, _ = imported(tmp_path / "t.parquet", tmp_path)
     assert (opened.found, opened.accepted) == (EPISODES, EPISODES - 1)
     assert "step, row 20" in opened.refused[0].reason
+    assert "a column `episode` that says so" in opened.refused[0].reason
 
 
 def test_rows_that_begin_anew_in_what_is_called_an_episode_are_refused(layouts, tmp_path):
