@@ -23,9 +23,9 @@ JUDGES = {
 """Words of what comes of an episode, wherever they end a part of a name (`is_success`)."""
 OF_A_JUDGE = {
     *("reason", "cause", "flag", "label", "code", "terms", "count", "number", "time", "frame"),
-    *("at", "first", "last"),
+    *("at", "first", "last", "prob", "probability", "likelihood", "confidence", "predicted"),
 }
-"""Words that say no more beside one of these (`termination_reason`)."""
+"""Words that say no more beside one of these (`termination_reason`, `success_prob`)."""
 MEASURES = {
     *("return", "returns", "ret", "rew", "score", "length", "len", "duration", "grade"),
     *("timeout", "timeouts", "mask", "next"),
@@ -47,6 +47,32 @@ COUNTED = {
     *("transitions", "ticks"),
 }
 """`num_steps`, `elapsed_time`, `episode_frames`; a `sample_number` may be that of a material."""
+EVENTS = {
+    *("collision", "collisions", "attempt", "attempts", "retry", "retries", "regrasp", "regrasps"),
+    *("violation", "violations", "intervention", "interventions", "correction", "corrections"),
+}
+"""What happens in an episode: `n_collisions`, `retry_count`; how many objects there are decides."""
+ERRORS = {"error", "errors", "err", "deviation", "residual", "rmse", "mse"}
+OF_FOLLOWING = {
+    *("tracking", "following", "control", "servo", "trajectory", "path", "placement", "insertion"),
+    *("position", "pos", "orientation", "pose", "rotation", "joint", "tcp", "ee", "eef"),
+    *("max", "mean", "avg", "average", "rms", "peak", "median", "std", "total", "m", "mm", "rad"),
+}
+"""How far the arm was from where it should be: `tracking_error`, `rms_position_error_mm`."""
+STATISTICS = {
+    *("max", "maximum", "min", "minimum", "mean", "avg", "average", "peak", "rms", "std"),
+    *("median", "total", "cumulative", "integral", "p95", "p99"),
+}
+MEASURED = {
+    *("force", "torque", "wrench", "effort", "current", "power", "energy", "work", "pressure"),
+    *("speed", "velocity", "vel", "acceleration", "accel", "jerk", "smoothness", "curvature"),
+    *("distance", "displacement", "travel", "clearance", "tilt", "contact"),
+}
+OF_AN_ARM = {
+    *("tcp", "ee", "eef", "joint", "joints", "gripper", "arm", "tool", "wrist", "left", "right"),
+    *("linear", "angular", "rotational", "abs", "absolute", "norm", "x", "y", "z", "xy", "xyz"),
+    *("n", "nm", "m", "mm", "rad", "deg", "s", "a", "w", "j"),
+}
 TAKEN = {"total", "elapsed", "execution", "completion", "finish", "stop"}
 """Words of how long it took, beside `time`."""
 ENDINGS = ("last", "end", "terminal")
@@ -84,6 +110,19 @@ def may_be_reason(name: str) -> bool:
     return not any(_is_judge(words) or _is_measure(words) for words in ends)
 
 
+def is_called_measured(name: str) -> bool:
+    """Whether its name is that of a statistic of motion or load (`max_force_n`, `mean_tcp_speed`).
+
+    It may as well be a limit that somebody set: its values tell. A setting comes again, a
+    measurement is another in each episode.
+    """
+    parts = [words for part in re.split(r"[/.\[\]]+", name) if (words := tokens(part))]
+    named = [said for words in parts if (said := {w for w in words if not w.isdigit()})]
+    said = named[-1] if named else set()
+    whole = said <= STATISTICS | MEASURED | OF_AN_ARM
+    return whole and bool(said & STATISTICS) and bool(said & MEASURED)
+
+
 def counts_rows(name: str) -> bool:
     """Whether it is one of the columns with which layouts number rows, episodes and files."""
     plain = name.lower().removeprefix("observation.")
@@ -110,8 +149,10 @@ def _is_count(words: list[str]) -> bool:
     said = {*_plain(words)}
     if "time" in said:
         return bool(said & TAKEN) and said <= TAKEN | WHOSE | {"time"}
-    counted = said & COUNTED and said & (HOW_MANY | WHOSE)
-    return bool(counted) and said <= COUNTED | HOW_MANY | WHOSE
+    if said & ERRORS:
+        return bool(said & OF_FOLLOWING) and said <= ERRORS | OF_FOLLOWING | WHOSE
+    counted = said & (COUNTED | EVENTS) and said & (HOW_MANY | WHOSE)
+    return bool(counted) and said <= COUNTED | EVENTS | HOW_MANY | WHOSE
 
 
 def _is_ending(words: list[str]) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.data.formats.consequences import counts_rows, may_be_reason
+from genpolicy.data.formats.consequences import counts_rows, is_called_measured, may_be_reason
 from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.interventions import Interventions
 from genpolicy.data.formats.leaves import MAXIMUM_LEAVES, SPANS, WIDEST, leaves, vector_of
@@ -24,6 +24,8 @@ SHORTEST_RUN = 4
 # In so few episodes it may flicker.
 FLICKERING_SHARE = 0.05
 SHOWN = 12
+# A setting comes again; a measurement is another number in most episodes.
+MEASURED_SHARE = 0.5
 # Of one observed column that the contract reads in part.
 MOST_ELEMENTS = 64
 PARTS = "says what was done and when"
@@ -136,13 +138,12 @@ class Reasons:
 
     def recorded(self) -> Recorded:
         """What varies; a value that is the same everywhere tells nothing."""
-        found = self._vectors.recorded()
-        for name, runs in self._runs.items():
-            # A text in some episodes and a list of numbers in others is one column of texts.
-            found[name] = found.get(name, {}) | runs
+        found = self._found()
         kept = {name: runs for name, runs in found.items() if not self._is_signal(name)}
         if self._session in kept and self._names_each(kept[self._session]):
             del kept[self._session]
+        for name in self._measured(kept):
+            del kept[name]
         return varying(kept, self._episodes)
 
     def notes(self, columns: Sequence[Column]) -> list[str]:
@@ -159,6 +160,7 @@ class Reasons:
             (wide, f"more than {WIDEST} numbers wide"),
             (signals, "changes row by row"),
             (judging, "counts rows or comes of the episode"),
+            (self._measured(self._found()), "measured in the episode, another number in most"),
             (sorted(self._cut), f"all but the first {MOST_ELEMENTS} numbers that are not observed"),
             (self._vectors.overfull(), f"more than {MOST_DIFFERENT} different rows"),
             (sorted(self._many), f"all but the first {MAXIMUM_LEAVES} of its parts"),
@@ -167,6 +169,22 @@ class Reasons:
             if names:
                 notes.append(f"Not looked at as a reason, {why}: {_listed(names)}.")
         return notes + self._interventions.notes(self.recorded())
+
+    def _found(self) -> dict[str, dict[str, Runs]]:
+        found = self._vectors.recorded()
+        for name, runs in self._runs.items():
+            # A text in some episodes and a list of numbers in others is one column of texts.
+            found[name] = found.get(name, {}) | runs
+        return found
+
+    def _measured(self, found: Recorded) -> list[str]:
+        """What is called a statistic of motion or load, and is another number in most episodes."""
+        return [
+            name
+            for name, runs in sorted(found.items())
+            if is_called_measured(name)
+            and len({each.values for each in runs.values()}) > MEASURED_SHARE * len(runs)
+        ]
 
     def _is_signal(self, name: str) -> bool:
         return self._flickering.get(name, 0) > FLICKERING_SHARE * self._episodes

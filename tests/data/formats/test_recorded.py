@@ -300,3 +300,16 @@ def test_what_is_not_kept_is_noted():
         "Not looked at as a reason, all but the first 256 of its parts: meta.",
         "Not looked at as a reason, too large: states.",
     ]
+
+
+def test_a_limit_that_was_set_is_asked_and_what_was_measured_is_not():
+    """Both may be called `max_force`: a setting comes again, a measurement hardly does."""
+    reasons = Reasons(PUSHT)
+    for k in range(8):
+        rows = {"max_speed": np.full(9, k % 2), "max_force": np.full(9, 7 + k / 10)}
+        reasons.add(RawEpisode(str(k), "", rows, {"info/mean_torque[1]": f"{k}.5"}), str(k))
+    assert set(reasons.recorded()) == {"max_speed"}
+    assert reasons.notes([]) == [
+        "Not looked at as a reason, measured in the episode, another number in most: "
+        "info/mean_torque[1], max_force."
+    ]
