@@ -11,8 +11,10 @@ both sides.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, recorded
@@ -23,6 +25,7 @@ from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.data.formats.units import tokens
 
 # A column that follows its command in fewer episodes stands, or is held by something.
 FOLLOWED = 0.5
@@ -40,6 +43,12 @@ LAG_ROWS = 4.0
 PLACES, ALIKE = 8, 3
 # If likes are on one side beyond this share, the offset is a matter of what they are like in.
 TOLD = 0.5
+# Words of what was carried or mounted, or of how stiff the arm was: another arm, no other unit. Who
+# was there, and when, tells of calibrations.
+CARRIED = {
+    *("load", "payload", "mass", "weight", "tool", "gripper", "finger", "fingers", "object"),
+    *("material", "stiffness", "compliance", "impedance", "damping", "gain", "gains", "kp", "kd"),
+}
 
 
 @dataclass(frozen=True)
@@ -180,9 +189,20 @@ def explained(
     lasted = np.diff(motion.starts)[known].astype(np.float64)[:, None]
     if paced and _told(_nearest(lasted), own) > TOLD:
         return True
-    same = [np.flatnonzero(objects == name) for name in objects]
-    alike = (group[group != k] for k, group in enumerate(same))
-    return recorded(objects) and _told(alike, own) > TOLD
+    said = [objects] if recorded(objects) else []
+    said += [
+        item.values[known]
+        for item in data.variables
+        if not item.by_row and CARRIED & {*tokens(item.name)}
+    ]
+    return any(_told(_same(values), own) > TOLD for values in said)
+
+
+def _same(values: NDArray[Any]) -> Iterator[Integers]:
+    """Those of the same value as each, without itself."""
+    for number, value in enumerate(values):
+        same = np.flatnonzero(values == value)
+        yield np.asarray(same[same != number], dtype=np.int64)
 
 
 def _told(alike: Iterable[Integers], chosen: Flags) -> float:

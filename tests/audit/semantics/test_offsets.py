@@ -17,6 +17,7 @@ from genpolicy.audit.semantics.calibration import offset_floor
 from genpolicy.audit.semantics.following import following
 from genpolicy.audit.semantics.motion import make_motion
 from genpolicy.audit.semantics.offsets import part_findings
+from genpolicy.audit.variable import Variable, numbered
 from genpolicy.seeds import stream
 
 EPISODES, PERIOD_S = 80, 0.05
@@ -198,6 +199,22 @@ def test_what_an_object_explains_is_no_calibration():
     assert found(replace(data, episodes=named)) == []
     other = replace(data.episodes, object=np.where(part_of(0.5, seed=9), "iron", "cork"))
     assert len(found(replace(data, episodes=other))) == 1
+
+
+@pytest.mark.parametrize("name", ["payload_kg", "info/tool", "impedance.stiffness"])
+def test_what_was_mounted_or_carried_explains_under_any_name(name):
+    commands, _, _ = world()
+    heavy = part_of(0.4)
+    data = recording(commands, shifted(answers(commands), heavy, HEAVY))
+
+    def with_column(name, values, **more):
+        return replace(data, variables=(Variable(name, values, **more),))
+
+    assert found(with_column(name, np.where(heavy, 1.5, 0.5))) == []
+    assert found(with_column(name, numbered(heavy))) == []
+    assert len(found(with_column(name, numbered(part_of(0.5, seed=9))))) == 1
+    # Whoever was there, and when, may have calibrated anew.
+    assert len(found(with_column("variable.batch", numbered(heavy)))) == 1
 
 
 def test_two_places_to_work_at_are_no_calibration():
