@@ -189,7 +189,7 @@ def explained(
     lasted = np.diff(motion.starts)[known].astype(np.float64)[:, None]
     if paced and _told(_nearest(lasted), own) > TOLD:
         return True
-    said = [objects] if recorded(objects) else []
+    said: list[NDArray[Any]] = [objects] if recorded(objects) else []
     said += [
         item.values[known]
         for item in data.variables
