@@ -2,7 +2,8 @@
 
 import shutil
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ import evidence
 from gates.card.card import card_bytes
 from gates.card.drafting import draft
 from gates.proof import judge
-from gates.report import GATES, read_report, report_bytes, report_path
+from gates.report import GATES, Gate, GateReport, read_report, report_bytes, report_path
 from gates.writing import write_gate
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.statistics import clustered
@@ -75,6 +76,12 @@ def _written(tmp_path_factory: pytest.TempPathFactory, _ladder: Path) -> Path:
     for gate in GATES:
         write_gate(root, gate)
     return root
+
+
+@pytest.fixture(scope="session")
+def judged(_ladder: Path) -> Callable[[Gate], GateReport]:
+    """The report of a gate on the ladder as it is built, made once; nobody writes into it."""
+    return cache(lambda gate: judge(_ladder, gate))
 
 
 @pytest.fixture

@@ -31,8 +31,8 @@ def test_what_is_missing_is_the_first_doubt(ladder):
     assert "strata.parquet" in found[lacking.index("strata_effect")].text
 
 
-def test_a_limit_inside_its_interval_is_not_decided_and_says_why(ladder):
-    report = judge(ladder, "A")
+def test_a_limit_inside_its_interval_is_not_decided_and_says_why(judged):
+    report = judged("A")
     (told,) = [c for c in report.criteria if c.id == "told_share"]
     astride = told.model_copy(
         update={"verdict": "INCONCLUSIVE", "interval": (0.1, 0.6), "caveat": "four of ten."}
@@ -42,9 +42,9 @@ def test_a_limit_inside_its_interval_is_not_decided_and_says_why(ladder):
     assert doubt.kind == "not decided" and doubt.text == f"{told.question} Four of ten."
 
 
-def test_a_limit_moved_to_what_was_measured_is_near(ladder):
-    held = next(c for c in judge(ladder, "A").criteria if c.id == "chunking_valid_share")
-    assert "chunking_valid_share" not in _near(judge(ladder, "A"))
+def test_a_limit_moved_to_what_was_measured_is_near(ladder, judged):
+    held = next(c for c in judged("A").criteria if c.id == "chunking_valid_share")
+    assert "chunking_valid_share" not in _near(judged("A"))
     evidence.write_params(ladder, evidence.set_limit("gate_a", held.id, held.measured * 1.05))
     report = judge(ladder, "A")
     assert "chunking_valid_share" in _near(report)
@@ -53,8 +53,8 @@ def test_a_limit_moved_to_what_was_measured_is_near(ladder):
     assert "another draw may break it." in text  # 5 of 105 are less than half of the interval
 
 
-def test_a_number_without_an_interval_is_said_to_be_one(ladder):
-    report = judge(ladder, "A")
+def test_a_number_without_an_interval_is_said_to_be_one(judged):
+    report = judged("A")
     (points,) = [d for d in doubts_of(report) if d.kind == "judged at a point"]
     assert "mode_feasible_share" in points.criteria
     assert "told_share" not in points.criteria and "data_defects" not in points.criteria
@@ -114,8 +114,8 @@ def test_a_candidate_that_fell_away_is_named_where_another_passes(ladder):
 
 
 @pytest.mark.parametrize("gate", "ABCD")
-def test_every_caveat_is_repeated_and_comes_last(ladder, gate):
-    report = judge(ladder, gate)
+def test_every_caveat_is_repeated_and_comes_last(judged, gate):
+    report = judged(gate)
     found = doubts_of(report)
     general = tuple(caveat for caveat in report.caveats if not BEYOND.match(caveat))
     count = len(general)
@@ -126,8 +126,8 @@ def test_every_caveat_is_repeated_and_comes_last(ladder, gate):
     assert bool(visited) == (gate == "D"), "a rule speaks of them, and each counts"
 
 
-def test_what_a_card_is_signed_in_spite_of_speaks_of_its_candidate(ladder):
-    report = judge(ladder, "D")
+def test_what_a_card_is_signed_in_spite_of_speaks_of_its_candidate(judged):
+    report = judged("D")
     promoted = report.promoted
     other = next(name for name in report.candidates if name != promoted)
     held = next(c for c in report.criteria if c.candidate == promoted and c.comparison == "<=")
@@ -149,8 +149,7 @@ def test_what_a_card_is_signed_in_spite_of_speaks_of_its_candidate(ladder):
     assert not any(caveat in text for caveat in report.caveats for text in said)
 
 
-def test_a_draft_says_what_could_make_its_reports_wrong(ladder):
-    reports = {gate: judge(ladder, gate) for gate in "ABCD"}
+def test_a_draft_says_what_could_make_its_reports_wrong(ladder, reports):
     doubts = [text for gate in "ABCD" for text in for_a_card(reports[gate], reports["D"].promoted)]
     kinds_said = {text.split(":")[0] for text in doubts}
     assert {f"Gate {gate}, judged at a point" for gate in "AD"} <= kinds_said
@@ -168,8 +167,8 @@ def _near(report):
 
 
 @pytest.fixture
-def reports(ladder):
-    return {gate: judge(ladder, gate) for gate in "ABCD"}
+def reports(judged):
+    return {gate: judged(gate) for gate in "ABCD"}
 
 
 def test_the_gravest_kind_comes_first_whatever_its_gate(reports):

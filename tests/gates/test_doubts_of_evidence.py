@@ -184,9 +184,9 @@ def test_gates_a_and_b_say_that_they_saw_one_training_too(caveat):
     assert not said("one training seed", answer(candidate=None, caveat=many))
 
 
-def test_the_ladder_of_one_seed_says_so_at_each_gate_that_has_trained_policies(ladder):
+def test_the_ladder_of_one_seed_says_so_at_each_gate_that_has_trained_policies(judged):
     for gate in "ABD":
-        report = judge(ladder, gate)
+        report = judged(gate)
         (found,) = [d for d in doubts_of(report) if d.kind == "one training seed"]
         assert len(found.criteria) == 1
 
@@ -218,15 +218,16 @@ def test_a_simpler_rule_that_is_only_shown_is_a_doubt_where_it_passes(caveat, pa
         assert SHOWN in doubt.text
 
 
-def test_gate_a_writes_what_the_rule_of_simpler_rules_reads(ladder):
+def test_gate_a_writes_what_the_rule_of_simpler_rules_reads(ladder, judged):
     """By the evidence: wherever the median of all passes, and one mode alone acts validly."""
-    before = [d for d in doubts_of(judge(ladder, "A")) if d.kind == "a simpler rule passes"]
+    before = [d for d in doubts_of(judged("A")) if d.kind == "a simpler rule passes"]
     evidence.edit_table(ladder, "audit/neighbourhoods.parquet",
                         lambda f: f.assign(median_admissible=True))  # fmt: skip
-    after = [d for d in doubts_of(judge(ladder, "A")) if d.kind == "a simpler rule passes"]
+    report = judge(ladder, "A")
+    after = [d for d in doubts_of(report) if d.kind == "a simpler rule passes"]
     new = [d for d in after if d not in before]
     assert [d.criteria[0] for d in new] == ["mean_defeated_share"]
-    caveats = {c.id: c.caveat for c in judge(ladder, "A").criteria}
+    caveats = {c.id: c.caveat for c in report.criteria}
     assert ONE_MODE.search(caveats["remedy_valid_share"])
     assert ONE_MODE.search(caveats["remedy_valid_share"])[1] == "one_mode_bc"
 

@@ -1,13 +1,10 @@
-"""What the tests of the figures share: whole evidence, judged once for each gate."""
+"""What the tests of the figures share: whole evidence."""
 
 import shutil
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
-
-from gates.proof import judge
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -18,12 +15,6 @@ def whole(tmp_path_factory, _ladder):
     root = tmp_path_factory.mktemp("plots") / "repo"
     shutil.copytree(_ladder, root)
     return root
-
-
-@pytest.fixture(scope="session")
-def judged(whole):
-    """The report of a gate on the whole evidence, made once."""
-    return cache(lambda gate: judge(whole, gate))
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ import pytest
 
 from gates.evidence import Evidence
 from gates.pages.desk_gain import gain_of
-from gates.proof import judge
 from gates.writing import write_gate
 from genpolicy.statistics.eprocess import gain_interval
 
@@ -21,8 +20,8 @@ def rows_of(root, report):
     return rows[rows["perturbation"].isin(report.settings["perturbations"])]
 
 
-def test_every_number_of_the_sentence_is_counted_again(ladder):
-    report = judge(ladder, "D")
+def test_every_number_of_the_sentence_is_counted_again(ladder, judged):
+    report = judged("D")
     rows, said = rows_of(ladder, report), gain_of({"D": report}, Evidence(ladder))
     counted = {name: (int(own["success"].sum()), len(own)) for name, own in rows.groupby("method")}
     best = max(report.settings["baselines"], key=lambda name: counted[name][0] / counted[name][1])
@@ -45,8 +44,8 @@ def test_every_number_of_the_sentence_is_counted_again(ladder):
     assert said in (ladder / "reports/index.html").read_text()
 
 
-def test_nobody_promoted_or_other_rollouts_say_nothing(ladder):
-    report = judge(ladder, "D")
+def test_nobody_promoted_or_other_rollouts_say_nothing(ladder, judged):
+    report = judged("D")
     assert gain_of({}, Evidence(ladder)) == ""
     nobody = report.model_copy(update={"promoted": None})
     assert gain_of({"D": nobody}, Evidence(ladder)) == ""

@@ -60,8 +60,8 @@ def test_a_density_that_is_no_finite_number_is_said_and_no_mean_is_drawn_over_it
     assert picture.in_words[2][2:] == ("15", "15", "0", "1")
 
 
-def test_without_it_the_gate_judges_the_same_and_the_page_says_what_is_missing(ladder):
-    before = judge(ladder, "B")
+def test_without_it_the_gate_judges_the_same_and_the_page_says_what_is_missing(ladder, judged):
+    before = judged("B")
     evidence.edit_table(ladder, DENSITY, lambda frame: frame.head(0))
     report = judge(ladder, "B")
     assert (report.verdict, report.criteria) == (before.verdict, before.criteria)

@@ -25,8 +25,8 @@ def test_every_setting_stands_in_the_table_and_the_deadline_in_the_figure(whole,
     assert listing.listed[1][1] in gate_page(whole, report)
 
 
-def test_without_times_the_gate_judges_the_same_and_the_page_says_what_is_missing(ladder):
-    before = judge(ladder, "B")
+def test_without_times_the_gate_judges_the_same_and_the_page_says_what_is_missing(ladder, judged):
+    before = judged("B")
     evidence.edit_table(ladder, SWEEP.removeprefix("artifacts/"), lambda frame: frame.head(0))
     report = judge(ladder, "B")
     assert (report.verdict, report.criteria) == (before.verdict, before.criteria)

@@ -41,8 +41,8 @@ def test_what_is_no_small_png_is_not_shown(ladder, data, why):
     assert f"Not drawn: {SCENE} is {why}" in page
 
 
-def test_a_scene_that_changed_after_judging_is_not_shown(ladder):
-    report = judge(ladder, "A")
+def test_a_scene_that_changed_after_judging_is_not_shown(ladder, judged):
+    report = judged("A")
     (ladder / SCENE).write_bytes(evidence.PNG + b"\0")
     (picture,) = draw_all(plots_scene.PLOTS[:1], Evidence(ladder), report)
     assert picture.photo == "" and "not the file that the report names" in picture.skipped

@@ -49,8 +49,8 @@ def test_the_criterion_says_how_many_of_the_misses_they_are(ladder):
     assert "process" not in other.caveat
 
 
-def test_where_none_failed_it_says_so_and_of_a_ladder_of_ours_nothing(ladder):
-    report = judge(ladder, "D")
+def test_where_none_failed_it_says_so_and_of_a_ladder_of_ours_nothing(ladder, judged):
+    report = judged("D")
     assert draw_all((FAILED,), Evidence(ladder), report) == []
     assert FAILED.title not in gate_page(ladder, report)
     failed(ladder, *((condition, "", 0) for condition in evidence.CONDITIONS))

@@ -13,10 +13,10 @@ from genpolicy.integrity.rows import read_rows, write_rows
 
 
 @pytest.fixture
-def tables(ladder):
+def tables(whole, judged):
     """The listed table and the folded ones, by name; lines without their heads."""
-    found = Evidence(ladder)
-    report = judge(ladder, "D")
+    found = Evidence(whole)
+    report = judged("D")
     folded = {item.summary: item.read(found, report)[1:] for item in WATCHED.folded}
     return {"": WATCHED.read(found, report)[1:], **folded}
 
@@ -54,8 +54,8 @@ def test_costs_have_owners_and_who_cannot_watch_says_why(tables):
     assert first[1] == "seed_disagreement" and "one seed" in first[2]
 
 
-def test_a_table_that_the_report_does_not_name_is_not_shown(ladder):
-    report = judge(ladder, "D")
+def test_a_table_that_the_report_does_not_name_is_not_shown(ladder, judged):
+    report = judged("D")
     write_rows(ladder / ALARMS, MonitorAlarmRow, read_rows(ladder / ALARMS, MonitorAlarmRow)[:-1])
     with pytest.raises(MissingEvidenceError, match="not the file that the report names"):
         WATCHED.read(Evidence(ladder), report)
@@ -84,8 +84,8 @@ def test_a_candidate_without_rows_is_said_beside_the_others(ladder):
     assert "not looked at" in line[1] and "has no rows of diffusion" in line[1]
 
 
-def test_the_page_shows_the_table_of_a_run(ladder):
+def test_the_page_shows_the_table_of_a_run(whole, judged):
     """What it reads is bound by the report of the run; else the page would say that it is not."""
-    (shown,) = draw_all([WATCHED], Evidence(ladder), judge(ladder, "D"))
+    (shown,) = draw_all([WATCHED], Evidence(whole), judged("D"))
     assert not shown.skipped
     assert len(shown.listed) > 1 and len(shown.folded) == 4
