@@ -4,6 +4,7 @@ A column is spelled once, in the class of its row. Who writes builds rows, so th
 column is a type error; who reads refuses a table with other columns by name.
 """
 
+import functools
 import types
 import typing
 from collections.abc import Iterable, Sequence
@@ -36,6 +37,11 @@ def schema_of(row: type) -> pa.Schema:
     Raises:
         ContractError: Not a dataclass, or a field of another type.
     """
+    return _schema_of(row)
+
+
+@functools.cache
+def _schema_of(row: type) -> pa.Schema:
     if not is_dataclass(row):
         raise _wrong(row.__name__, "a class that is no dataclass")
     hints = typing.get_type_hints(row)
