@@ -43,19 +43,13 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import NOMINAL_PROBE, Start, Task, World, WorldSettings, load_task
+from genpolicy.tasks.same_again import FORCE_N, FREE, IN_CONTACT
 from genpolicy.verification.journal_source import readable
 
 OF_A_JOURNAL = 6
 """Rollouts of a journal of the comparison that are played again; four of them successes."""
 OF_A_PROBE = 3
 """The same of a journal of the monitors or of a search, which promote nobody."""
-FREE = 1e-5
-"""Of a state before anything touches, m, rad or without unit: it has six decimals, and ten times
-what 1e-7 moved it by."""
-IN_CONTACT = 1e-4
-"""The same from the first contact on: thirty times what 1e-7 moved it by."""
-FORCE_N = 0.1
-"""Of a force, N: sixteen times what 1e-7 moved it by."""
 ROUNDED_N = 1e-6
 """How far a journal may round a force that is on record, N."""
 EDGE_M = 1e-7

@@ -6,7 +6,8 @@ also stops the ladder before a stage would replace files that somebody else put 
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
 policy that is brought is not what its entry says, or does not answer where it should run already,
 where an exception of one is over, where a method or its sampler is none, where what may differ
-between methods never may, and where the machine has no such device: before anything trains.
+between methods never may, where the machine has no such device, and where the task does not do the
+same again: before anything trains.
 """
 
 import sys
@@ -29,6 +30,7 @@ from genpolicy.policies.methods import check_sampler, method_named
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
+from genpolicy.tasks.same_again import require_same_again
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -53,7 +55,13 @@ def work(params: Params) -> None:
             _require_answering(policy)
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
-    source = source_document(params.section("source", SourceSection))
+    section = params.section("source", SourceSection)
+    source = source_document(section)
+    require_same_again(
+        load_task(params.task.name),
+        period_s=params.horizons.action_period_s,
+        demonstrates=section.kind == "embedded",
+    )
     with output_folder(ARTIFACTS / "task") as folder:
         write_bytes(folder / IDENTITY.file, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))

@@ -3,12 +3,14 @@
 import json
 import sys
 
+import numpy as np
 import pytest
 import yaml
 
 from gates.exceptions import utc_today
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.integrity.hashing import sha256_file, sha256_tree
+from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
 from tests.candidates.conftest import ENTRY
 
 JOINTS = {
@@ -105,3 +107,18 @@ def test_one_that_gate_b_has_asked_may_have_ended_since(workspace, bring, stage)
         (place / "identity.json").write_text(json.dumps({"planted": {"checkpoint": checkpoint}}))
         found, said = stage("task")
         assert (found, "where no policy answers" in said) == (code, True), said
+
+
+def test_a_task_that_does_not_do_the_same_again_stops_the_ladder(workspace, stage, monkeypatch):
+    """Before anything of it is recorded, and with nothing written."""
+    advance = TabletopWorld.advance
+
+    def shaken(world, on_step=None):
+        advance(world, on_step)
+        world.data.qvel[0] += 1e-3 * np.random.default_rng().uniform()
+
+    monkeypatch.setattr(TabletopWorld, "advance", shaken)
+    code, said = stage("task")
+    assert code == 2, said
+    assert "the task tabletop_insertion: the same start and commands a second time is" in said
+    assert not (workspace / "artifacts").exists()
