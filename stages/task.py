@@ -19,10 +19,11 @@ from genpolicy.candidates.brought import BroughtPolicy, BroughtSection, require_
 from genpolicy.candidates.hosts.loadable import require_answering, require_loadable
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
 from genpolicy.policies.determinism import require_device
 from genpolicy.policies.matched_training import PolicySettings
@@ -78,13 +79,24 @@ def _require_answering(policy: BroughtPolicy) -> None:
 
 
 def _asked(policy: BroughtPolicy) -> bool:
-    """Whether the evidence of Gate B is of this entry."""
-    try:
-        found = read_json(ARTIFACTS / "reload" / "identity.json")
-    except BadInputError:
+    """Whether the evidence of Gate B is of this entry.
+
+    Raises:
+        BadInputError: It cannot be read.
+    """
+    folder = ARTIFACTS / "reload"
+    if not (folder / CANDIDATES.file).exists():
         return False
-    own = found.get(policy.name) if isinstance(found, dict) else None
-    return isinstance(own, dict) and own.get("checkpoint") == policy.sha256
+    try:
+        own = CANDIDATES.read(folder).get(policy.name)
+    except (BadInputError, IntegrityError) as error:
+        raise BadInputError(
+            where=f"the policy {policy.name}",
+            found="silent, and whether Gate B has asked it cannot be read",
+            expected=f"an answer, or a whole {folder / CANDIDATES.file} ({error})",
+            action="Start it: then nobody asks the document, and stage `reload` writes it again.",
+        ) from error
+    return own is not None and own.checkpoint == policy.sha256
 
 
 def _required_methods(params: Params) -> list[str]:
