@@ -10,7 +10,7 @@ from typing import Any
 
 from gates.floors import LONGEST_DAYS
 from gates.report import parse_section, stage_of
-from gates.reproducibility.settings import Unmatched
+from gates.reproducibility.settings import Unmatched, of_nobody
 from gates.settings import PARAMS_FILE
 from genpolicy.errors import ConfigError
 
@@ -80,14 +80,14 @@ def require_unmatched(
     Raises:
         ConfigError: It does not, or is not.
     """
+    if brought is not None and (others := of_nobody(entries, brought)):
+        raise ConfigError(
+            where=_place(others[0]),
+            found="an exception of nobody who was brought",
+            expected=f"one of {', '.join(sorted(brought)) or 'none: candidates is empty'}",
+            action="What is trained here is matched: remove it, or correct the name.",
+        )
     for name, entry in sorted(entries.items()):
-        if brought is not None and name not in brought:
-            raise ConfigError(
-                where=_place(name),
-                found="an exception of nobody who was brought",
-                expected=f"one of {', '.join(sorted(brought)) or 'none: candidates is empty'}",
-                action="What is trained here is matched: remove it, or correct the name.",
-            )
         renew = "Write a new last day and why it still stands, or leave the candidate out."
         require_day(_place(name), entry.expires, day, over=renew)
 

@@ -2,11 +2,11 @@
 
 Everything else about a journal holds for the chunks of any policy. Here a sample of invocations is
 given to the checkpoint of that name again: the same observations, the same names of the noise. The
-sample is drawn by the hash of the journal, so that nobody who writes one can choose what is asked.
+sample is drawn by a hash of all journals and tables of the folder (`gates.sampled`).
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from gates.rederive_joined import Rule, hold_joined, prefixes_of
 from gates.rederive_sessions import REPLACING, checkpoint_of
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
+from gates.sampled import ROLLOUTS, salt_of, some
 from gates.stated import device_of, refuse, section, training_seed
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of, loaded_on
@@ -32,10 +33,8 @@ from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.evidence.shadow.shadow import HELD_OUT, TWO_MODES
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.journal import encode_poses
-from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
 from genpolicy.policies.protocol import NoiseName, Policy
-from genpolicy.seeds import stream
 from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.drawn import Drawn, Source, drawn_chunks
 from genpolicy.verification.journal_source import readable
@@ -106,12 +105,13 @@ def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequ
     stress = section(params, "stress", StressSettings)
     task = load_task(section(params, "task", TaskSection).name)
     asked: dict[str, list[Asked]] = defaultdict(list)
+    salt = salt_of([*journals, *(path.parent.parent / ROLLOUTS for path in journals)])
     for path in journals:
         with readable(f"{path.parent.name}/{path.name}"):
             drawn, wrong = drawn_chunks(path)
         if wrong:
             refuse("D", path.name, wrong, "every invocation with what it saw and its own noise")
-        for item in _of_either(drawn, path):
+        for item in _of_either(drawn, path.name, salt):
             asked[item.method].append(_asked(task, path, item))
     _draw_again("D", root, params, asked, samples=stress.samples, joining=stress.joining)
 
@@ -129,19 +129,20 @@ def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
     shadow = section(params, "shadow", ShadowSection)
     horizons = section(params, "horizons", HorizonConfig)
     data = load_dataset(root / DATASET)
+    salt = salt_of([*(root / SHADOW).glob("*.mcap"), *(root / SHADOW).glob("*.parquet")])
     moments: dict[str, dict[tuple[str, int], list[CandidateRow]]] = defaultdict(dict)
     for row in read_rows(root / SHADOW / "candidates.parquet", CandidateRow):
         if row.fixture in (HELD_OUT, TWO_MODES):
             moments[row.method].setdefault((row.fixture, row.observation), []).append(row)
     asked: dict[str, list[Asked]] = {}
     for method, of_method in moments.items():
-        chosen = some(sorted(of_method), OF_A_METHOD, root / SHADOW / "journal.mcap")
+        chosen = some(sorted(of_method), OF_A_METHOD, name=method, salt=salt)
         rows = [row for moment in chosen for row in of_method[moment]]
         asked[method] = [_of_row(data, horizons, row) for row in rows]
     _draw_again("C", root, params, asked, samples=shadow.samples, joining=REPLACING, always=True)
 
 
-def _of_either(drawn: Sequence[Drawn], path: Path) -> list[Drawn]:
+def _of_either(drawn: Sequence[Drawn], name: str, salt: str) -> list[Drawn]:
     """Some of a journal, half of them with numbers where there are so many.
 
     Only numbers tell what another processor rounds from what another checkpoint drew.
@@ -149,15 +150,9 @@ def _of_either(drawn: Sequence[Drawn], path: Path) -> list[Drawn]:
     kinds = [[one for one in drawn if (one.actions is None) is hidden] for hidden in (False, True)]
     numbered, hashed = kinds
     count = max(OF_A_JOURNAL - len(hashed), OF_A_JOURNAL // 2)
-    chosen = list(some(numbered, count, path))
-    return [*chosen, *some(hashed, OF_A_JOURNAL - len(chosen), path)]
-
-
-def some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:
-    """At most so many of the items, by the hash of a file, in their order."""
-    generator = stream(0, "drawn again", path.name, sha256_file(path))
-    chosen = generator.choice(len(items), size=min(count, len(items)), replace=False)
-    return [items[i] for i in sorted(chosen.tolist())]
+    chosen = some(numbered, count, name=f"{name}, numbers", salt=salt)
+    left = OF_A_JOURNAL - len(chosen)
+    return [*chosen, *some(hashed, left, name=f"{name}, hashes", salt=salt)]
 
 
 def _asked(task: Task, path: Path, item: Drawn) -> Asked:

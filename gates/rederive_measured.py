@@ -2,8 +2,8 @@
 
 That a table is bound by hash says that nobody changed it behind the report. Here its numbers are
 held against the checkpoints that it speaks of: the same situations, the same names of the noise,
-the same six layers. The situations are drawn by the hash of the table, so that nobody who writes
-one can choose what is asked. Who was brought is asked in a process of its own, as the stage did.
+the same six layers. The situations are drawn by a hash of all tables of the folder
+(`gates.sampled`). Who was brought is asked in a process of its own, as the stage did.
 """
 
 from collections import defaultdict
@@ -15,10 +15,10 @@ from typing import Any
 
 from gates.rederive_brought import brought_policy
 from gates.rederive_conformance import REPEATS
-from gates.rederive_draws import some
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.reproducibility.settings import RELOAD
+from gates.sampled import salt_of, some
 from gates.stated import device_of, mapping, refuse, section
 from genpolicy.candidates.judged import candidates_of, loaded_on, sampling_by
 from genpolicy.candidates.wire.policy import running
@@ -228,8 +228,9 @@ def _by_each(
 
 
 def _some_of(held_out: HeldOut, table: Path) -> HeldOut:
-    """At most so many of the situations, by the hash of the table, in their order."""
-    chosen = list(some(range(len(held_out.situations)), OF_A_TABLE, table))
+    """At most so many of the situations, by a hash of all tables of the folder, in their order."""
+    salt = salt_of(table.parent.glob("*.parquet"))
+    chosen = some(range(len(held_out.situations)), OF_A_TABLE, name=table.name, salt=salt)
     situations = tuple(held_out.situations[i] for i in chosen)
     return HeldOut(situations, held_out.observations[chosen])
 

@@ -32,6 +32,7 @@ from gates.called_for import uncalled_for
 from gates.played_again import FORCE, POSE, Played, Recorded, play, recorded_rollouts
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
+from gates.sampled import ROLLOUTS, salt_of
 from gates.stated import refuse, root_seed, section
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.stress.matched import matched_starts
@@ -39,23 +40,15 @@ from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.nanoseconds import NS_PER_S, to_ns
-from genpolicy.integrity.documents import canonical_json
-from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import NOMINAL_PROBE, Start, Task, World, WorldSettings, load_task
+from genpolicy.tasks.same_again import FORCE_N, FREE, IN_CONTACT
 from genpolicy.verification.journal_source import readable
 
 OF_A_JOURNAL = 6
 """Rollouts of a journal of the comparison that are played again; four of them successes."""
 OF_A_PROBE = 3
 """The same of a journal of the monitors or of a search, which promote nobody."""
-FREE = 1e-5
-"""Of a state before anything touches, m, rad or without unit: it has six decimals, and ten times
-what 1e-7 moved it by."""
-IN_CONTACT = 1e-4
-"""The same from the first contact on: thirty times what 1e-7 moved it by."""
-FORCE_N = 0.1
-"""Of a force, N: sixteen times what 1e-7 moved it by."""
 ROUNDED_N = 1e-6
 """How far a journal may round a force that is on record, N."""
 EDGE_M = 1e-7
@@ -66,9 +59,6 @@ ENDS: Mapping[Outcome | None, Outcome] = {
 }  # fmt: skip
 """What the world has to say of an outcome. The others are ends of which it knows nothing."""
 ENDLESS = (Outcome.TIMEOUT, Outcome.INTERVENTION)
-
-ROLLOUTS = "rollouts.parquet"
-"""What is said of the rollouts of a folder, beside its folder of journals."""
 
 Wrong = tuple[str, str, str]
 """What of a rollout, what it says, and what it would have to."""
@@ -167,7 +157,7 @@ def play_again(cells: Cells, journals: Sequence[Path], count: int, *, pushed: bo
         IntegrityError: No regular file.
         BadInputError: A journal cannot be read.
     """
-    salt = _salt(journals)
+    salt = salt_of([*journals, *(path.parent.parent / ROLLOUTS for path in journals)])
     for path in journals:
         with readable(f"{path.parent.name}/{path.name}"):
             rollouts = recorded_rollouts(path)
@@ -180,13 +170,6 @@ def play_again(cells: Cells, journals: Sequence[Path], count: int, *, pushed: bo
                 if rollouts[name].pushes and not pushed:
                     refuse(cells.gate, f"{place}: pushes", "some", "none, as planned")
                 _hold(cells, place, rollouts[name])
-
-
-def _salt(journals: Sequence[Path]) -> str:
-    """A hash of all journals and of their table, which nothing changes without all samples."""
-    tables = {path.parent.parent / ROLLOUTS for path in journals}
-    files = [*sorted(journals), *sorted(table for table in tables if table.is_file())]
-    return sha256_bytes(canonical_json([[path.name, sha256_file(path)] for path in files]))
 
 
 def _asked(

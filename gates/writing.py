@@ -24,7 +24,9 @@ INDEX = "reports/index.html"
 def write_gate(root: Path, gate: Gate) -> GateReport:
     """Judge a gate and write its report: rows, Markdown, HTML, then JSON.
 
-    A FAIL is a result like any other and raises nothing.
+    A FAIL is a result like any other and raises nothing. What is refused before anything is judged
+    leaves the report that is there; a judgement that began and cannot end leaves none, since one
+    of before would be nobody's.
 
     Raises:
         ConfigError: The section of `params.yaml` is missing or wrong, or a limit is overridden by
@@ -32,9 +34,9 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
         BadInputError: Evidence that is not what it claims to be, or an unwritable place.
     """
     base = root / report_path(gate)
+    require_written(root)
     _remove(base)
     write_index(root)
-    require_written(root)
     report = judge(root, gate)
     printed = printed_beside(root, report)
     with output_folder(root / rows_folder(gate)) as folder:

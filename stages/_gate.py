@@ -9,6 +9,7 @@ cache to say which verdict turned.
 
 from pathlib import Path
 
+from gates.overriders import require_written
 from gates.report import Answer, Gate, GateReport
 from gates.writing import write_gate
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -20,6 +21,7 @@ def judge(letter: Gate, params: Params) -> None:
     """Judge one gate; the verdict is an artifact like any other, whatever it says."""
     del params  # parsed already: unknown sections and keys are refused before anything is judged
     name = f"gate_{letter.lower()}"
+    require_written(Path.cwd())  # before the folder of the verdict goes, as of the report
     with output_folder(ARTIFACTS / name) as folder:
         report = write_gate(Path.cwd(), letter)
         token = {

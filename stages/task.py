@@ -6,7 +6,8 @@ also stops the ladder before a stage would replace files that somebody else put 
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
 policy that is brought is not what its entry says, or does not answer where it should run already,
 where an exception of one is over, where a method or its sampler is none, where what may differ
-between methods never may, and where the machine has no such device: before anything trains.
+between methods never may, where the machine has no such device, and where the task does not do the
+same again: before anything trains.
 """
 
 import sys
@@ -18,10 +19,11 @@ from genpolicy.candidates.brought import BroughtPolicy, BroughtSection, require_
 from genpolicy.candidates.hosts.loadable import require_answering, require_loadable
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
 from genpolicy.policies.determinism import require_device
 from genpolicy.policies.matched_training import PolicySettings
@@ -29,6 +31,7 @@ from genpolicy.policies.methods import check_sampler, method_named
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
+from genpolicy.tasks.same_again import require_same_again
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -53,7 +56,13 @@ def work(params: Params) -> None:
             _require_answering(policy)
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
-    source = source_document(params.section("source", SourceSection))
+    section = params.section("source", SourceSection)
+    source = source_document(section)
+    require_same_again(
+        load_task(params.task.name),
+        period_s=params.horizons.action_period_s,
+        demonstrates=section.kind == "embedded",
+    )
     with output_folder(ARTIFACTS / "task") as folder:
         write_bytes(folder / IDENTITY.file, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))
@@ -70,13 +79,24 @@ def _require_answering(policy: BroughtPolicy) -> None:
 
 
 def _asked(policy: BroughtPolicy) -> bool:
-    """Whether the evidence of Gate B is of this entry."""
-    try:
-        found = read_json(ARTIFACTS / "reload" / "identity.json")
-    except BadInputError:
+    """Whether the evidence of Gate B is of this entry.
+
+    Raises:
+        BadInputError: It cannot be read.
+    """
+    folder = ARTIFACTS / "reload"
+    if not (folder / CANDIDATES.file).exists():
         return False
-    own = found.get(policy.name) if isinstance(found, dict) else None
-    return isinstance(own, dict) and own.get("checkpoint") == policy.sha256
+    try:
+        own = CANDIDATES.read(folder).get(policy.name)
+    except (BadInputError, IntegrityError) as error:
+        raise BadInputError(
+            where=f"the policy {policy.name}",
+            found="silent, and whether Gate B has asked it cannot be read",
+            expected=f"an answer, or a whole {folder / CANDIDATES.file} ({error})",
+            action="Start it: then nobody asks the document, and stage `reload` writes it again.",
+        ) from error
+    return own is not None and own.checkpoint == policy.sha256
 
 
 def _required_methods(params: Params) -> list[str]:

@@ -213,13 +213,14 @@ def promoted(report: GateReport) -> str:
     """
     name = report.promoted
     if report.verdict != "PASS" or name is None or report.candidates.get(name) != "PASS":
+        nobody = "Keep the simpler policy; there is nothing to put on a card."
         raise RefusedError(
             gate="D",
             criterion="promoted",
             measured=name or "none",
             limit="a method that passed",
             report="reports/gate_d.json",
-            action="Keep the simpler policy; there is nothing to put on a card.",
+            action=report.decision if report.verdict == "PASS" and name is None else nobody,
         )
     return name
 

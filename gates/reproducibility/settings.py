@@ -1,7 +1,7 @@
 """Settings of Gate B, and where its evidence lies."""
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import ClassVar
 
 from pydantic import Field, field_validator, model_validator
@@ -49,6 +49,11 @@ class Unmatched(StrictModel):
     def _a_day(cls, value: str) -> str:
         datetime.date.fromisoformat(value)
         return value
+
+
+def of_nobody(excepted: Collection[str], brought: Collection[str]) -> list[str]:
+    """Names of exceptions that are of nobody who was brought: what is trained here is matched."""
+    return sorted(set(excepted) - set(brought))
 
 
 class ReproducibilitySettings(CandidateSettings):
@@ -108,7 +113,7 @@ class ReproducibilitySettings(CandidateSettings):
 
     @model_validator(mode="after")
     def _exceptions_of_brought(self) -> "ReproducibilitySettings":
-        if others := sorted(set(self.unmatched) - set(self.brought)):
+        if others := of_nobody(self.unmatched, self.brought):
             raise ValueError(
                 f"{', '.join(others)} is excepted and not among `candidates`; what is trained here "
                 "is matched"

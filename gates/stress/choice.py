@@ -3,7 +3,8 @@
 Passing says that a candidate beats the simple policies; it does not order the candidates. The
 order is a question of its own, with a paired test of its own. Where no test tells them apart the
 decision says so, and which of them goes on the card follows from a rule fixed before the run: the
-one whose answers come sooner, then the one registered first.
+one whose answers come sooner, then the one registered first. Of several that are all unmatched no
+rule may choose: a person does.
 """
 
 import math
@@ -22,6 +23,11 @@ from gates.words import points
 from genpolicy.statistics.eprocess import paired_e_value
 
 PASSED_UNMATCHED = "also passed, unmatched and so not ranked"
+CHOOSING = (
+    "No card is drafted until one of them is left: take the exceptions of the others out of "
+    "gate_b.unmatched in params.yaml, commit that with the reason, and run `dvc repro`."
+)
+"""How a person chooses where nobody may compare; who is left out stays in the plan, and counts."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,7 @@ def choose(judged: Judged) -> Decision:
     every = [name for name in settings.candidates if judged.candidates.get(name) == "PASS"]
     passed = [name for name in every if name not in settings.unmatched]
     if not passed:
-        return _of_unmatched(every, judged)
+        return _of_unmatched(every)
     if len(passed) < len(every):
         decision = _of_matched(passed, judged, settings)
         beside = ", ".join(name for name in every if name not in passed)
@@ -60,14 +66,15 @@ def choose(judged: Judged) -> Decision:
     return _of_matched(passed, judged, settings)
 
 
-def _of_unmatched(passed: Sequence[str], judged: Judged) -> Decision:
-    """Of those that nobody may rank the one whose answers come sooner is drafted."""
-    chosen = sooner(passed, _latency(judged)) if len(passed) > 1 else passed[0]
-    others = [name for name in passed if name != chosen]
-    text = f"promote {chosen}, {IN_SHORT}, on unmatched evidence"
-    if others:
-        text += f"; {PASSED_UNMATCHED}: {', '.join(others)}"
-    return Decision(text, promoted=chosen)
+def _of_unmatched(passed: Sequence[str]) -> Decision:
+    """The only one; of several that nobody may rank a person chooses, and none is drafted."""
+    if len(passed) == 1:
+        text = f"promote {passed[0]}, {IN_SHORT}, on unmatched evidence"
+        return Decision(text, promoted=passed[0])
+    return Decision(
+        f"promote either of {', '.join(sorted(passed))}, {IN_SHORT}, on unmatched evidence: no "
+        f"ranking may rest on it, so that a person chooses. {CHOOSING}"
+    )
 
 
 def _of_matched(passed: Sequence[str], judged: Judged, settings: StressSettings) -> Decision:

@@ -152,14 +152,16 @@ def test_no_card_may_outlive_the_first_exception_that_ends():
     assert first_end((), "flow") == ""
 
 
-def test_a_gate_is_not_judged_under_an_exception_that_is_over(root):
+def test_a_gate_is_not_judged_under_an_exception_that_is_over_and_loses_no_report(root):
+    """Nothing was judged: what stands there is what it was, and is proved as ever."""
     _write(root, expires="2020-01-01")
     report = root / report_path("D")
     report.parent.mkdir()
     report.write_text("{}")
     with pytest.raises(ConfigError, match="over since 2020-01-01"):
         commands.judge("D", root)
-    assert not report.exists(), "no verdict is left rather than an old one"
+    assert report.read_text() == "{}"
+    assert [path.name for path in report.parent.iterdir()] == [report.name]
 
 
 def test_the_chain_is_not_green_on_an_exception_that_is_over(root, monkeypatch):

@@ -3,6 +3,8 @@
 import shutil
 import sys
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -81,7 +83,7 @@ def test_of_a_journal_what_has_numbers_is_asked_where_there_is_some(
     drawn, _ = module.drawn_chunks(journals[0])
     one = next(item for item in drawn if item.actions is not None)
     many = [one] * numbered + [replace(one, actions=None)] * hashed
-    chosen = module._of_either(many, journals[0])
+    chosen = module._of_either(many, journals[0].name, "salt")
     assert len(chosen) == module.OF_A_JOURNAL
     assert sum(item.actions is not None for item in chosen) == asked
 
@@ -172,14 +174,27 @@ def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
         rederive_rollout_draws(root, params, journals[:1])
 
 
-def test_which_are_drawn_again_follows_from_the_journal_and_is_bounded(journals, tmp_path):
-    def chosen(path):
-        return list(module.some(range(1000), 12, path))
-
-    assert chosen(journals[0]) == chosen(journals[0]) and len(chosen(journals[0])) == 12
-    assert chosen(journals[0]) != chosen(journals[1])
-    assert list(module.some(range(3), 12, journals[0])) == [0, 1, 2]
-    assert list(module.some([], 12, journals[0])) == []
+def test_whoever_changes_one_journal_or_the_table_draws_all_samples_anew(tmp_path, monkeypatch):
+    """Else a lie in one is missed by trying out that one alone, as often as it takes."""
+    folder = tmp_path / "journals"
+    folder.mkdir()
+    paths = [folder / f"flow__{name}.mcap" for name in ("nominal", "push")]
+    for path in paths:
+        path.write_bytes(b"1")
+    made = [SimpleNamespace(method="flow", actions=number, n=number) for number in range(40)]
+    asked = []
+    monkeypatch.setattr(module, "drawn_chunks", lambda path: (made, ""))
+    monkeypatch.setattr(module, "_asked", lambda task, path, item: (path.name, item.n))
+    monkeypatch.setattr(module, "_draw_again", lambda *a, **k: asked.append(a[3]["flow"]))
+    for change in (None, paths[0], paths[1], tmp_path / "rollouts.parquet", None):
+        if change is not None:
+            change.write_bytes(b"2")
+        rederive_rollout_draws(tmp_path, PARAMS, paths)
+    assert asked[-1] == asked[-2] and len(asked[0]) == 2 * module.OF_A_JOURNAL
+    for before, after in pairwise(asked[:-1]):
+        for path in paths:
+            own = [{n for name, n in one if name == path.name} for one in (before, after)]
+            assert own[0] != own[1]
 
 
 @pytest.fixture(scope="module")
@@ -222,6 +237,24 @@ def test_shadow_candidates_of_this_checkpoint_stand_and_of_another_are_refused(
     rederive_shadow_draws(shadows[0], shadow_params)
     with pytest.raises(RefusedError, match=r"candidate flow/\w+/\d+/0 is up to 0\.\d+ beside it"):
         rederive_shadow_draws(shadows[1], shadow_params)
+
+
+def test_which_of_the_shadow_are_drawn_again_follows_from_the_table_as_well(
+    shadows, shadow_params, tmp_path, monkeypatch
+):
+    """Else whoever writes the table knows beforehand at which of its moments nobody asks."""
+    root = shutil.copytree(shadows[0], tmp_path / "repo")
+    path = root / SHADOW / "candidates.parquet"
+    asked = []
+    monkeypatch.setattr(module, "OF_A_METHOD", 4)
+    monkeypatch.setattr(module, "_draw_again", lambda *a, **k: asked.append(a[3]["flow"]))
+    rederive_shadow_draws(root, shadow_params)
+    rows = read_rows(path, CandidateRow)
+    for number in range(6):
+        rows[0] = replace(rows[0], raw=[float(number), *rows[0].raw[1:]])
+        write_rows(path, CandidateRow, rows)
+        rederive_shadow_draws(root, shadow_params)
+    assert len({tuple(one.place for one in items) for items in asked}) > 1
 
 
 @pytest.mark.parametrize(("changes", "said"), [

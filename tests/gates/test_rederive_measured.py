@@ -56,11 +56,13 @@ def hold(tmp_path, monkeypatch):
     return holds
 
 
-def test_true_rows_are_asked_again_at_a_sample_that_the_table_chooses(hold):
+def test_true_rows_are_asked_again_at_a_sample_that_all_tables_choose(hold, tmp_path):
     first, second = hold(true_rows())[:2]
     assert len(first) == module.OF_A_TABLE and first == second
     other = [replace(row, spread_m=0.02) for row in true_rows()]
     assert hold(other)[-1] != first
+    (tmp_path / PATH).with_name("beside.parquet").write_bytes(b"2")
+    assert hold(true_rows())[-1] != first
 
 
 def test_a_row_within_one_sample_is_rounding_and_all_of_a_policy_are_not(hold):

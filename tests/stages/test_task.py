@@ -1,14 +1,21 @@
 """Stage `task` refuses a candidate that is not what it should be, before anything trains."""
 
-import json
 import sys
+from dataclasses import fields
 
+import numpy as np
 import pytest
 import yaml
 
 from gates.exceptions import utc_today
 from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.evidence.documents.reproducibility import (
+    CANDIDATES,
+    CandidateIdentity,
+    IdentityCard,
+)
 from genpolicy.integrity.hashing import sha256_file, sha256_tree
+from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
 from tests.candidates.conftest import ENTRY
 
 JOINTS = {
@@ -95,13 +102,68 @@ def test_an_exception_is_read_before_anything_trains(
     assert code == 2 and told in said, said
 
 
-def test_one_that_gate_b_has_asked_may_have_ended_since(workspace, bring, stage):
-    """Nothing trains for it; what asks it again finds it silent, and what does not goes on."""
-    bring(command=None, address="ws://127.0.0.1:1")
+def _empty(kind, **known):
+    """A document in which nobody has recorded anything else."""
+    kinds = (("Annotated", 0), ("list", []), ("None", None), ("float", 0.0), ("str", ""))
+    plain = {
+        field.name: next((value for word, value in kinds if word in str(field.type)), 0)
+        for field in fields(kind)
+    }
+    return kind(**(plain | known))
+
+
+@pytest.fixture
+def asked(workspace):
+    """Writes the evidence of Gate B: whom it has asked, by checkpoint."""
     place = workspace / "artifacts" / "reload"
     place.mkdir(parents=True)
+
+    def write(checkpoint):
+        card = _empty(IdentityCard)
+        own = _empty(CandidateIdentity, checkpoint=checkpoint, card=card)
+        CANDIDATES.write(place, {"planted": own})
+        return place / CANDIDATES.file
+
+    return write
+
+
+def test_one_that_gate_b_has_asked_may_have_ended_since(workspace, bring, asked, stage):
+    """Nothing trains for it; what asks it again finds it silent, and what does not goes on."""
+    bring(command=None, address="ws://127.0.0.1:1")
     own = read_entry(workspace / "own" / "planted.yaml").sha256
     for checkpoint, code in ((own, 0), ("0" * 64, 2)):
-        (place / "identity.json").write_text(json.dumps({"planted": {"checkpoint": checkpoint}}))
+        asked(checkpoint)
         found, said = stage("task")
         assert (found, "where no policy answers" in said) == (code, True), said
+
+
+@pytest.mark.parametrize(("damage", "told"), [
+    (lambda data: data[:-40], "not JSON"),
+    (lambda data: data.replace(b'"nonfinite_chunks"', b'"nonfinite_chunk"'), "unknown key"),
+    (lambda data: b"[]", "a document with"),
+])  # fmt: skip
+def test_who_was_asked_is_not_guessed_from_a_damaged_document(
+    workspace, bring, asked, stage, damage, told
+):
+    bring(command=None, address="ws://127.0.0.1:1")
+    path = asked(read_entry(workspace / "own" / "planted.yaml").sha256)
+    path.write_bytes(damage(path.read_bytes()))
+    code, said = stage("task")
+    assert (code, said.count("\n")) == (2, 1), said
+    assert "the policy planted is silent, and whether Gate B has asked it cannot be read" in said
+    assert told in said and "artifacts/reload/identity.json" in said
+
+
+def test_a_task_that_does_not_do_the_same_again_stops_the_ladder(workspace, stage, monkeypatch):
+    """Before anything of it is recorded, and with nothing written."""
+    advance = TabletopWorld.advance
+
+    def shaken(world, on_step=None):
+        advance(world, on_step)
+        world.data.qvel[0] += 1e-3 * np.random.default_rng().uniform()
+
+    monkeypatch.setattr(TabletopWorld, "advance", shaken)
+    code, said = stage("task")
+    assert code == 2, said
+    assert "the task tabletop_insertion: the same start and commands a second time is" in said
+    assert not (workspace / "artifacts").exists()

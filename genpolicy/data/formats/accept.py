@@ -10,7 +10,7 @@ from genpolicy.data.assemble import FLAGS, STRATA, AcceptedEpisode, content_hash
 from genpolicy.data.checks import check_finite, check_frozen, check_range
 from genpolicy.data.contract import IngestContract
 from genpolicy.data.formats.contract import SI, ChannelSource, ImportContract, selectors
-from genpolicy.data.formats.interventions import flags_in
+from genpolicy.data.formats.interventions import FALSE, TRUE, flags_in
 from genpolicy.data.formats.source import RawEpisode, as_float, refuse
 from genpolicy.data.recording.episode import ACTION_STREAM, NOT_RECORDED, StreamSamples
 from genpolicy.data.resample import Rows
@@ -23,8 +23,8 @@ NS_PER_S = 1_000_000_000
 NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
 LARGEST_NS = 2.0**62
 MAXIMUM_TEXT = 200
-SUCCESS = ("success", "succeeded", "successful", "true", "1", "1.0", "yes")
-FAILURE = ("failure", "fail", "failed", "false", "0", "0.0", "no")
+SUCCESS = ("success", "succeeded", "successful", *TRUE)
+FAILURE = ("failure", "fail", "failed", *FALSE)
 BY_ROW = "is_intervention"
 MISSING = ("", "nan", "none", "null", NOT_RECORDED)
 
@@ -252,9 +252,9 @@ def _flag(raw: RawEpisode, contract: ImportContract, name: str) -> bool | None:
     text = _label(raw, column).lower()
     if text == NOT_RECORDED:
         return None
-    if text not in ("true", "1", "1.0", "false", "0", "0.0"):
+    if text not in (*TRUE, *FALSE):
         refuse(f"{raw.label}: {name}", repr(text)[:60], "true or false")
-    return text in ("true", "1", "1.0")
+    return text in TRUE
 
 
 def _label(raw: RawEpisode, column: str | None) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from genpolicy.data.formats.source import RawEpisode, as_float
 
 TRUE, FALSE = ("true", "1", "1.0", "yes"), ("false", "0", "0.0", "no")
+"""Words of recorders for yes and no, in small letters; of rows and of an episode alike."""
 
 
 class Interventions:

@@ -70,3 +70,15 @@ def test_millimetres_and_degrees_become_metres_and_radians(layouts, tmp_path):
     rows = dataset.frames.episode == dataset.episodes["source_file"].tolist().index("0.parquet")
     np.testing.assert_allclose(dataset.frames.observation[rows], state[:, :2], atol=1e-12)
     np.testing.assert_allclose(dataset.frames.action[rows], action[:, :2], atol=1e-12)
+
+
+@pytest.mark.parametrize("words", [("yes", "no"), ("True", "False"), ("1.0", "0.0")])
+def test_flags_of_an_episode_are_read_by_the_same_words_as_those_of_its_rows(
+    long, layouts, tmp_path, words
+):
+    parts = [rows(layouts, i, is_recovery=[words[i % 2]] * 30) for i in range(8)]
+    pq.write_table(pa.concat_tables(parts), long)
+    opened = open_dataset(long, out=tmp_path / "out")
+    assert opened.contract.labels.is_recovery == "is_recovery" and not opened.refused
+    kept = load_dataset(tmp_path / "out").episodes.set_index("episode_uuid")["is_recovery"]
+    assert [kept[uuid] for uuid in UUIDS] == [True, False] * 4

@@ -5,6 +5,7 @@ import pytest
 from asked import settings_of
 from editing import cells
 
+from gates.card.card import promoted
 from gates.claim import IN_SHORT
 from gates.engine import Judged
 from gates.evidence import Evidence
@@ -12,6 +13,8 @@ from gates.proof import judge
 from gates.stress import choice
 from gates.stress.choice import Comparison, choose, comparisons, pair_alpha, sooner
 from gates.stress.pairs import paired_differences
+from gates.writing import write_gate
+from genpolicy.errors import RefusedError
 from genpolicy.statistics.eprocess import paired_e_value
 
 ROLLOUTS, INVOCATIONS = "stress/rollouts.parquet", "stress/invocations.parquet"
@@ -170,10 +173,15 @@ def test_who_stands_by_exception_is_ranked_with_nobody(ladder):
     assert any("flow is unmatched evidence" in text for text in report.caveats)
 
 
-def test_of_those_that_nobody_may_rank_the_sooner_is_drafted_and_it_says_so(ladder):
+def test_between_those_that_nobody_may_rank_a_person_chooses(ladder):
+    """Also where one answers sooner: that too would be a choice of the tool."""
     unmatched(ladder, "flow", "diffusion")
-    report = judge(ladder, "D")
-    assert report.promoted == "flow"
-    assert "on unmatched evidence; also passed, unmatched and so not ranked: diffusion" in (
-        report.decision
+    report = write_gate(ladder, "D")
+    assert (report.verdict, report.promoted) == ("PASS", None)
+    assert report.decision.startswith(
+        f"promote either of diffusion, flow, {IN_SHORT}, on unmatched evidence: no ranking may "
+        "rest on it, so that a person chooses."
     )
+    assert "a person chooses" in (ladder / "reports/gate_d.md").read_text()
+    with pytest.raises(RefusedError, match=r"take the exceptions of the others out of gate_b\.unm"):
+        promoted(report)
