@@ -105,3 +105,25 @@ def test_one_that_gate_b_has_asked_may_have_ended_since(workspace, bring, stage)
         (place / "identity.json").write_text(json.dumps({"planted": {"checkpoint": checkpoint}}))
         found, said = stage("task")
         assert (found, "where no policy answers" in said) == (code, True), said
+
+
+def test_the_planner_of_the_task_is_compared_or_nothing_trains(workspace, edit, stage):
+    """In a rehearsal it may be left out; no ladder to a card is without it."""
+
+    def without(params):
+        params["stress"]["baselines"].remove("classical_planner")
+
+    edit(workspace, without)
+    code, said = stage("task")
+    assert code == 2 and "stress.baselines is without classical_planner" in said, said
+    edit(workspace, lambda params: params.update(rehearsal=True))
+    code, said = stage("task")
+    assert code == 0, said
+
+
+def test_nobody_who_was_brought_has_the_name_of_the_planner(workspace, bring, edit, stage):
+    bring(name="classical_planner")
+    named = {"classical_planner": "own/planted.yaml"}
+    edit(workspace, lambda params: params.update(candidates=named))
+    code, said = stage("task")
+    assert code == 2 and "candidates.classical_planner is a name that a trained method" in said
