@@ -4,6 +4,7 @@ import textwrap
 
 from gates.planned_power import MOST_STARTS, Gain, Stated
 from gates.planning import Plan
+from genpolicy.contract.planner import PLANNER
 
 COLUMNS = 80
 WHATEVER = "Gate D would be INCONCLUSIVE whatever the rollouts show"
@@ -20,6 +21,7 @@ def plan_text(plan: Plan) -> str:
         f"margin {plan.margin:g}",
         "",
         *_stated_text(plan),
+        *_simple_text(plan),
         *_weighed_text(plan),
         "",
         "What these starts can show",
@@ -81,6 +83,12 @@ def _stated_text(plan: Plan) -> list[str]:
         f"{plan.power:.0%} {needed}",
         *_crowded_text(stated),
     ]
+
+
+def _simple_text(plan: Plan) -> list[str]:
+    """Each method that a candidate must beat, by name."""
+    lacks = "" if PLANNER in plan.simple else f"; no {PLANNER}: none is compared"
+    return _warned(f"To beat, each by the margin: {', '.join(plan.simple)}{lacks}")
 
 
 def _crowded_text(stated: Stated) -> list[str]:

@@ -73,6 +73,7 @@ class Plan:
     Attributes:
         starts: Starts of each method in each condition.
         methods: Candidates and baselines, each run on every start.
+        simple: Names of the baselines, each of which a candidate must beat.
         conditions: Names.
         candidates: Names of those that are registered; alpha is shared between them.
         rollouts: Over all methods and conditions: the comparison.
@@ -94,6 +95,7 @@ class Plan:
 
     starts: int
     methods: int
+    simple: tuple[str, ...]
     conditions: tuple[str, ...]
     candidates: tuple[str, ...]
     rollouts: int
@@ -151,6 +153,7 @@ def plan_of(root: Path) -> Plan:
     return Plan(
         starts=settings.planned_starts,
         methods=len(methods),
+        simple=settings.baselines,
         conditions=settings.perturbations,
         candidates=settings.candidates,
         rollouts=rollouts,

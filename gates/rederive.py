@@ -26,6 +26,7 @@ from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_monitors import rederive_monitors
 from gates.rederive_outcomes import rederive_outcomes
+from gates.rederive_planner import rederive_planner
 from gates.rederive_policies import rederive_policies
 from gates.rederive_refused import rederive_refused
 from gates.rederive_searched import rederive_searched
@@ -150,6 +151,7 @@ def _evidence(root: Path, gate: Gate) -> None:
         rederive_shadow(root, params)
         rederive_shadow_draws(root, params)
     else:
+        rederive_planner(params)
         _tables(root, params, held_to[1], journals)
         rederive_clocks(root, params, held_to)
         rederive_monitors(root, params, held_to)

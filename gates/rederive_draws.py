@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gates.rederive_brought import brought_policy
 from gates.rederive_joined import Rule, hold_joined, prefixes_of
+from gates.rederive_planner import planner_of_ladder
 from gates.rederive_sessions import REPLACING, checkpoint_of
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
@@ -27,6 +28,7 @@ from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.planner import PLANNER
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.settings import ShadowSection
@@ -206,6 +208,10 @@ def _draw_again(
     rows = section(params, "horizons", HorizonConfig).prediction_horizon
     device = device_of(params)
     for method, items in sorted(asked.items()):
+        if method == PLANNER:
+            rule = Rule(joining.named(method), rows)
+            _compare(gate, planner_of_ladder(params).load(), items, count=1, rule=rule)
+            continue
         other = brought_policy(root, params, method)
         if other is not None:
             with running(other, task.observation, scene=task.scene_path) as wire:

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from gates.rederive_brought import brought_policy
 from gates.rederive_distilled import identity
+from gates.rederive_planner import planner_maker
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import mapping, refuse, root_seed, section, training_seed
 from genpolicy.candidates.joining import REPLACE, JoiningSettings
 from genpolicy.candidates.judged import BASELINES, GENERATORS
+from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.integrity.documents import canonical_json, read_json
@@ -69,6 +71,8 @@ def rederive_sessions(
 
     @cache
     def maker(method: str) -> Maker | None:
+        if method == PLANNER:
+            return planner_maker(params, joining.named(method))
         other = brought_policy(root, params, method)
         if other is not None:
             return other.sha256, joining.named(method).sampler_hash(other.sampler_sha256)

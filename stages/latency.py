@@ -53,6 +53,8 @@ def work(params: Params) -> None:
         brought=brought,
         seed=seed,
         device=params.compute.device,
+        task=params.task.name,
+        horizons=params.horizons,
     )
     plan = LatencyPlan(
         dataset=ARTIFACTS / "ingest",

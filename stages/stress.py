@@ -59,7 +59,7 @@ def work(params: Params) -> None:
     )
     judged = in_comparison(
         ARTIFACTS, baselines=section.baselines, candidates=admitted, brought=brought, seed=seed,
-        device=params.compute.device,
+        device=params.compute.device, task=params.task.name, horizons=params.horizons,
     )  # fmt: skip
     # Alpha is shared between all that were registered, not between those that came this far.
     trained = params.section("train_generators", MethodsSection).samplers

@@ -15,13 +15,17 @@ from pathlib import Path
 
 from gates.exceptions import require_unmatched, unmatched_written, utc_today
 from gates.may_differ import require_possible
+from gates.protection import is_rehearsal
 from genpolicy.candidates.brought import BroughtPolicy, BroughtSection, require_brought
 from genpolicy.candidates.hosts.loadable import require_answering, require_loadable
 from genpolicy.candidates.mapped import require_mapped
+from genpolicy.candidates.planned import require_compared
+from genpolicy.contract.planner import PLANNER
 from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.failure_search.settings import search_settings
+from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
@@ -44,6 +48,8 @@ def work(params: Params) -> None:
     require_own_files(Path.cwd())
     require_possible(params.raw.get("comparison"))
     search_settings(params.raw)  # read by a stage behind the last gate; wrong, it is told here
+    simple = params.section("stress", StressSettings).baselines
+    require_compared(params.task.name, simple, rehearsal=is_rehearsal(params.raw))
     entries = params.section("candidates", BroughtSection).root
     brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     names = [policy.entry.name for policy in brought]
@@ -102,7 +108,7 @@ def _asked(policy: BroughtPolicy) -> bool:
 def _required_methods(params: Params) -> list[str]:
     """Names of all that is trained here, each a method with a sampler that fits it."""
     head = params.section("policy", PolicySettings).head
-    names = []
+    names = [PLANNER]  # that of the task, whether it offers one or not
     for stage in ("train_baselines", "train_generators"):
         for name, sampler in params.section(stage, MethodsSection).samplers.items():
             check_sampler(method_named(name), sampler, head)

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.pipeline import TASK
 from gates.report import Gate, GateReport, parse_section
 from gates.stress.rollouts import ROLLOUTS, StressSettings
 from gates.stress.utility import mean_worth
+from genpolicy.contract.planner import PLANNER, planner_sha256
+from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.evidence.rows.stress import RolloutRow
 
@@ -21,7 +24,8 @@ class Rollback:
 
     Attributes:
         policy: Name of the simple method.
-        checkpoint_sha256: Of the weights of its first seed, as gate A's report names them.
+        checkpoint_sha256: Of the weights of its first seed, as gate A's report names them; of the
+            task's planner, its identity.
         succeeded: Rollouts of the comparison in which it succeeded.
         rollouts: Of how many, all planned conditions together.
         utility: What they were worth on average; None where success alone is compared.
@@ -54,7 +58,8 @@ def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollb
         evidence: Below the same root.
 
     Raises:
-        IntegrityError: No simple method rolled out, or gate A's report names no weights of it.
+        IntegrityError: No simple method rolled out, gate A's report names no weights of it, or the
+            task of a planner is not known.
     """
     try:
         settings = parse_section(StressSettings, reports["D"].settings, where=SETTINGS)
@@ -69,16 +74,28 @@ def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollb
     if not worth:
         raise _unknown(ROLLOUTS, "no rollout of a simple method", "the comparison of gate D")
     best = max(worth, key=lambda name: worth[name])
+    checkpoint = _checkpoint(best, reports["A"], evidence)
+    won = flags(tried[best], "success")
+    utility = worth[best] if settings.utility else None
+    return Rollback(best, checkpoint, int(won.sum()), len(won), utility)
+
+
+def _checkpoint(best: str, need: GateReport, evidence: Evidence) -> str:
+    """SHA-256 of a simple method; of the planner, by the task that this ladder is about."""
+    if best == PLANNER:
+        try:
+            return planner_sha256(evidence.document(TASK, IDENTITY).sha256)
+        except MissingEvidenceError as error:
+            where = f"{TASK}/{IDENTITY.file}"
+            raise _unknown(where, str(error), "the task whose planner did best") from error
     weights = sorted(
         (path, digest)
-        for path, digest in reports["A"].materials.items()
+        for path, digest in need.materials.items()
         if path.startswith(f"{TRAINED}/{best}/") and path.endswith(f"/{WEIGHTS}")
     )
     if not weights:
         raise _unknown("reports/gate_a.json: materials", f"no weights of {best}", "their hash")
-    won = flags(tried[best], "success")
-    utility = worth[best] if settings.utility else None
-    return Rollback(best, weights[0][1], int(won.sum()), len(won), utility)
+    return weights[0][1]
 
 
 def require_rollback(text: str, reports: Mapping[Gate, GateReport], evidence: Evidence) -> None:

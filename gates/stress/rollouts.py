@@ -15,6 +15,7 @@ from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
 from gates.stress.weights import Weights, explained, require_weights
 from gates.words import percent
+from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
@@ -33,6 +34,13 @@ DRILL = "recovery_drill"
 """Condition in which recovery is called for on every start, so that it is exercised."""
 ENVELOPE = "envelope"
 """The one condition inside the workspace and the speed of the trial card, which allows no other."""
+
+UNPLANNED = (
+    f"No classical planner was compared: `stress.baselines` does not name {PLANNER}, as where a "
+    "task offers none, or in a rehearsal. Whether a scripted plan from the same observations does "
+    "as well as a candidate is not known."
+)
+"""Said where no planner stands among the simple methods."""
 
 Interval = tuple[float, float, float]
 """Share or quantile, lower and upper end."""
@@ -107,12 +115,17 @@ class StressSettings(CandidateSettings):
 
     @property
     def caveats(self) -> tuple[str, ...]:
-        """What is compared, if not success; whose gain may be one of its training."""
+        """What is compared, if not success; who is not; whose gain may be one of its training."""
         weighed = (explained(self.utility, self.longest_s),) if self.utility else ()
-        return weighed + tuple(
-            f"{name} is unmatched evidence: a gain of it may be one of other data or a longer "
-            "training. It is ranked with nobody."
-            for name in sorted(self.unmatched)
+        unplanned = () if PLANNER in self.baselines else (UNPLANNED,)
+        return (
+            weighed
+            + unplanned
+            + tuple(
+                f"{name} is unmatched evidence: a gain of it may be one of other data or a longer "
+                "training. It is ranked with nobody."
+                for name in sorted(self.unmatched)
+            )
         )
 
     @property

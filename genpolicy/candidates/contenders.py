@@ -7,12 +7,17 @@ from pathlib import Path
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, compared, trained
+from genpolicy.candidates.planned import PlannedPolicy, PlannerPolicy, planned
 from genpolicy.candidates.wire.policy import WirePolicy, running
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.observation import ObservationContract
+from genpolicy.contract.planner import PLANNER
 from genpolicy.policies.policy import NetworkPolicy
 
-Contender = JudgedPolicy | BroughtPolicy
-Running = NetworkPolicy | WirePolicy
+Promotable = JudgedPolicy | BroughtPolicy
+"""Who may stand for promotion."""
+Contender = Promotable | PlannedPolicy
+Running = NetworkPolicy | WirePolicy | PlannerPolicy
 
 
 @contextmanager
@@ -56,7 +61,7 @@ def admitted_contenders(
     *,
     seed: int,
     device: str,
-) -> list[Contender]:
+) -> list[Promotable]:
     """Those that a gate admitted, in its order.
 
     Args:
@@ -84,8 +89,10 @@ def in_comparison(
     brought: Sequence[BroughtPolicy],
     seed: int,
     device: str,
+    task: str,
+    horizons: HorizonConfig,
 ) -> list[Contender]:
-    """Baselines, then trained candidates, then brought ones: who stands in the comparison.
+    """The planner, baselines, trained candidates, brought ones: who stands in the comparison.
 
     Args:
         artifacts: Folder of the stages' outputs.
@@ -94,12 +101,19 @@ def in_comparison(
         brought: Every policy that was brought; those that are no candidate stay out.
         seed: The training seed that is promoted.
         device: Torch device of those that run here; one that was brought says its own.
+        task: Registered name of the task, whose planner may be among the baselines.
+        horizons: Of the ladder.
 
     Raises:
-        ConfigError: A method stands on both sides.
+        ConfigError: A method stands on both sides, or the task offers no planner.
         BadInputError: A checkpoint is missing or malformed.
     """
     others = {policy.name for policy in brought}
     own = [name for name in candidates if name not in others]
-    ours = compared(artifacts, baselines=baselines, generators=own, seed=seed, device=device)
-    return [*ours, *(policy for policy in brought if policy.name in candidates)]
+    learned = [name for name in baselines if name != PLANNER]
+    ours = compared(artifacts, baselines=learned, generators=own, seed=seed, device=device)
+    return [
+        *([planned(task, horizons, seed=seed)] if PLANNER in baselines else []),
+        *ours,
+        *(policy for policy in brought if policy.name in candidates),
+    ]

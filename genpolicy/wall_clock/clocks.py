@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.contenders import Contender, Running
+from genpolicy.candidates.contenders import Promotable, Running
 from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.judged import candidates_of
 from genpolicy.candidates.wire.entry import ServerEntry, verify_files
@@ -59,7 +59,7 @@ TABLES: dict[type, str] = {
 def write_clocks(
     folder: Path,
     shared: Bench,
-    candidates: Sequence[Contender],
+    candidates: Sequence[Promotable],
     models: Mapping[str, LatencyModel],
 ) -> None:
     """Journals of every candidate by both clocks, what they say, and what the checker says of them.
@@ -97,7 +97,7 @@ def write_clocks(
 
 def run_both(
     shared: Bench,
-    candidate: Contender,
+    candidate: Promotable,
     model: LatencyModel,
     *,
     journals: Path,
@@ -205,7 +205,7 @@ class _Asked:
 
 
 @contextmanager
-def _asked_elsewhere(candidate: Contender, shared: Bench) -> Iterator[_Asked]:
+def _asked_elsewhere(candidate: Promotable, shared: Bench) -> Iterator[_Asked]:
     """The server of one that was brought is started and ended here: no kill leaves it behind."""
     if not isinstance(candidate, BroughtPolicy):
         policy = candidate.load()

@@ -7,6 +7,7 @@ import yaml
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.planned import planned
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.evidence.stress.latency import (
@@ -16,7 +17,7 @@ from genpolicy.evidence.stress.latency import (
     LatencyModel,
 )
 from genpolicy.evidence.stress.matched import matched_starts, run_shard
-from genpolicy.evidence.stress.perturbations import ReducedEnvelope
+from genpolicy.evidence.stress.perturbations import Nominal, ReducedEnvelope
 from genpolicy.evidence.stress.shard import Comparison, Shard
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.journal import Journal, read_journal, write_journal
@@ -94,6 +95,23 @@ def roll_out(path, checkpoint, *, joining=None, starts=4, **execution):
     )  # fmt: skip
     judged = JudgedPolicy("flow", 0, folder, sha256, "cpu")
     run_shard(Shard(comparison, judged, times, "envelope", slow, path))
+    return path
+
+
+def roll_out_planned(path):
+    """A shard of a second of rollouts of the task's planner."""
+    comparison = Comparison(
+        task=TASK.name, starts=tuple(start.to_json() for start in STARTS[:2]),
+        episode_limit_s=1.0, samples=SAMPLES,
+        cell=Cell(HORIZONS, ExecutionSettings(**PARAMS["execution"])),
+        feasibility=FeasibilitySettings(**PARAMS["feasibility"]), root_seed=PARAMS["seed"],
+    )  # fmt: skip
+    times = LatencyModel(
+        {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},
+        {name: np.full(8, 0.004) for name in MEASURED_TERMS}, 0.0,
+    )  # fmt: skip
+    run_shard(Shard(comparison, planned(TASK.name, HORIZONS, seed=0), times, "nominal", Nominal(),
+                    path))  # fmt: skip
     return path
 
 

@@ -4,10 +4,13 @@ from gates.plan_text import plan_text
 from gates.planned_power import Gain, Stated
 from gates.planning import Bound, Plan
 
+SIMPLE = ("bc", "act", "classical_planner")
 
-def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed=""):
+
+def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed="", simple=SIMPLE):
     return Plan(
-        starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
+        starts=90, methods=8, simple=simple, conditions=("nominal", "push"),
+        candidates=("diffusion", "flow"),
         rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed,
         searched_rollouts=searched, longest_s=63_000.0,
         measure="utility" if weighed else "success", weighed=weighed, margin=0.05, alpha=0.0125,
@@ -32,6 +35,8 @@ def test_golden_what_a_person_reads_of_a_plan():
         "The stated effect: success 80% against 50% (stress.planned_effect)",
         "  found in 86% of trials with 90 starts; in 80% from about 77 starts on",
         "  in 57% if all 5 simple methods are worth 50%",
+        "",
+        "To beat, each by the margin: bc, act, classical_planner",
         "",
         "What these starts can show",
         "  kept        up to 3 of 90",
@@ -80,7 +85,13 @@ def test_a_broken_test_is_a_fail_and_no_question_of_more_starts():
 def test_what_is_compared_is_said_where_it_is_not_success():
     lines = plan_text(made(weighed="duration 0.2, fallback 0.1")).splitlines()
     assert lines[4] == "The stated effect: utility 80% against 50% (stress.planned_effect)"
-    said = " ".join(lines[8:13])
+    said = " ".join(lines[10:15])
     assert said.startswith("Compared is utility: a success less duration 0.2, fallback 0.1, each")
     assert "it is found in 40%." in said
     assert "utility" not in plan_text(made())
+
+
+def test_a_plan_without_the_planner_says_that_none_is_compared():
+    assert "by the margin: bc; no classical_planner: none is compared" in plan_text(
+        made(simple=("bc",))
+    )

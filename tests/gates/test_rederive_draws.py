@@ -8,7 +8,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from one_flow import HORIZONS, PARAMS, SAMPLES, TASK, edited, folder_of, roll_out, train_flow
+from one_flow import (
+    HORIZONS,
+    PARAMS,
+    SAMPLES,
+    TASK,
+    edited,
+    folder_of,
+    roll_out,
+    roll_out_planned,
+    train_flow,
+)
 
 from gates import rederive_draws as module
 from gates.rederive_draws import SHADOW, rederive_rollout_draws, rederive_shadow_draws
@@ -118,6 +128,32 @@ def _seen_elsewhere(kind, payload):
         seen[:, 17] += 0.01
         payload["history"] = encode_actions(seen)
     return payload
+
+
+def test_chunks_of_the_planner_are_planned_again(params, tmp_path, monkeypatch):
+    """It has no checkpoint; another planner of the task, or other numbers, are found."""
+    path = roll_out_planned(tmp_path / "classical_planner__nominal.mcap")
+    rederive_rollout_draws(tmp_path, params, [path])
+
+    class Aside:
+        """A planner that goes a little beside it."""
+
+        checkpoint_hash, stochastic = "e" * 64, False
+
+        def __init__(self, own):
+            self.own = own
+
+        def load(self):
+            return self
+
+        def sample(self, *words, **named):
+            drawn = self.own.sample(*words, **named)
+            return replace(drawn, actions=drawn.actions + 1e-3)
+
+    own = module.planner_of_ladder(params)
+    monkeypatch.setattr(module, "planner_of_ladder", lambda _: Aside(own.load()))
+    with pytest.raises(RefusedError, match=r"classical_planner/nominal/\d/\d+.*0\.001 beside it"):
+        rederive_rollout_draws(tmp_path, params, [path])
 
 
 @pytest.mark.parametrize(("change", "said"), [

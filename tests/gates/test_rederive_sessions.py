@@ -6,7 +6,10 @@ import pytest
 import yaml
 from makers import maker, write_policy
 
+from gates.rederive_planner import planner_maker
 from gates.rederive_sessions import checkpoint_of, rederive_sessions
+from genpolicy.candidates.joining import JoiningSettings
+from genpolicy.contract.planner import PLANNER
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.stress.measured import Measured, rounded
 from genpolicy.execution.journal import Journal, write_journal
@@ -135,3 +138,11 @@ def test_a_candidate_that_was_a_baseline_of_gate_a_too_is_the_one_that_ran(tmp_p
     (folders[1] / "config.json").write_text("{}")
     assert checkpoint_of(tmp_path, "ibc", 0) == folders[1]
     assert checkpoint_of(tmp_path, "flow", 0) is None
+
+
+def test_a_session_of_the_planner_was_made_by_that_of_the_task_as_it_is_now(asked):
+    own = planner_maker(PARAMS, JoiningSettings())
+    asked(_session(PLANNER, 0, makers=[own]))
+    for other in ((OTHER, own[1]), (own[0], OTHER), maker("flow")):
+        with pytest.raises(RefusedError, match="classical_planner/nominal/0: made by"):
+            asked(_session(PLANNER, 0, makers=[other]))

@@ -167,3 +167,25 @@ def test_a_task_that_does_not_do_the_same_again_stops_the_ladder(workspace, stag
     assert code == 2, said
     assert "the task tabletop_insertion: the same start and commands a second time is" in said
     assert not (workspace / "artifacts").exists()
+
+
+def test_the_planner_of_the_task_is_compared_or_nothing_trains(workspace, edit, stage):
+    """In a rehearsal it may be left out; no ladder to a card is without it."""
+
+    def without(params):
+        params["stress"]["baselines"].remove("classical_planner")
+
+    edit(workspace, without)
+    code, said = stage("task")
+    assert code == 2 and "stress.baselines is without classical_planner" in said, said
+    edit(workspace, lambda params: params.update(rehearsal=True))
+    code, said = stage("task")
+    assert code == 0, said
+
+
+def test_nobody_who_was_brought_has_the_name_of_the_planner(workspace, bring, edit, stage):
+    bring(name="classical_planner")
+    named = {"classical_planner": "own/planted.yaml"}
+    edit(workspace, lambda params: params.update(candidates=named))
+    code, said = stage("task")
+    assert code == 2 and "candidates.classical_planner is a name that a trained method" in said

@@ -15,8 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.contenders import joining_of
+from genpolicy.candidates.contenders import Running, joining_of
 from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
+from genpolicy.candidates.planned import PlannerPolicy
 from genpolicy.candidates.votes import Prediction, Votes, join, prefix
 from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import join_action
@@ -102,10 +103,34 @@ def measure_policy(
     def load() -> NetworkPolicy:
         return load_policy(folder, expected_sha256=expected_sha256, sampler=sampler, device=device)
 
+    return measure_loaded(
+        load,
+        observations,
+        cold_repeats=cold_repeats,
+        warm_repeats=warm_repeats,
+        discarded_repeats=discarded_repeats,
+        candidates=candidates,
+        project=project,
+        joining=joining,
+    )
+
+
+def measure_loaded(
+    load: Callable[[], NetworkPolicy | PlannerPolicy],
+    observations: Array,
+    *,
+    cold_repeats: int,
+    warm_repeats: int,
+    discarded_repeats: int = DISCARDED,
+    candidates: int,
+    project: Projection | None,
+    joining: JoiningSettings,
+) -> list[Measurement]:
+    """The same of whatever `load` gives, anew before each cold invocation."""
     results = []
     with run_queue() as queue:
 
-        def timed(policy: NetworkPolicy, index: int) -> dict[str, Span]:
+        def timed(policy: NetworkPolicy | PlannerPolicy, index: int) -> dict[str, Span]:
             row = observations[index % len(observations)][None]
             return _spans(_Clock(queue), policy, _Asked(row, index, candidates), project, joining)
 
@@ -167,7 +192,7 @@ def measure_running(
 
 
 def invoke(
-    policy: NetworkPolicy | WirePolicy,
+    policy: Running,
     row: Array,
     *,
     repeat: int,
@@ -214,7 +239,7 @@ class _Clock:
 
 def _spans(
     clock: _Clock,
-    policy: NetworkPolicy | WirePolicy,
+    policy: Running,
     asked: _Asked,
     project: Projection | None,
     joining: JoiningSettings,
@@ -237,9 +262,7 @@ def _spans(
     return clock.spans
 
 
-def _drawn(
-    clock: _Clock, policy: NetworkPolicy | WirePolicy, asked: _Asked, guided: Prefix | None
-) -> Array:
+def _drawn(clock: _Clock, policy: Running, asked: _Asked, guided: Prefix | None) -> Array:
     """Chunks (N, K, D_a) of an observation, and what the terms of the model took."""
     name = ("latency", asked.repeat)
     if isinstance(policy, WirePolicy):
@@ -248,6 +271,8 @@ def _drawn(
         )
         clock.spans.update({str(term): Span(seconds, None) for term, seconds in terms.items()})
         return chunks
+    if isinstance(policy, PlannerPolicy):
+        return _planned(clock, policy, asked)
     with clock.timed(Term.PREPROCESS):
         normalised = policy.preprocess(asked.row)
     with clock.timed(Term.ENCODE):
@@ -259,6 +284,17 @@ def _drawn(
         )
     own: Array = samples.actions[0]
     return own
+
+
+def _planned(clock: _Clock, policy: PlannerPolicy, asked: _Asked) -> Array:
+    """Chunks (N, K, D_a) of a planner: it plans where others sample, and encodes nothing."""
+    with clock.timed(Term.PREPROCESS):
+        checked = policy.preprocess(asked.row)
+    with clock.timed(Term.ENCODE):
+        pass
+    with clock.timed(Term.SAMPLE):
+        chunks = policy.plan(checked)
+    return np.repeat(chunks, asked.candidates, axis=0)
 
 
 def _plan_before(metadata: ChunkMetadata, rows: int, reach: int) -> Votes:

@@ -18,6 +18,7 @@ from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import Contender
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.planned import PlannedPolicy
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
@@ -27,6 +28,7 @@ from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
 from genpolicy.evidence.reproducibility.benchmark import (
     Measurement,
+    measure_loaded,
     measure_policy,
     measure_running,
 )
@@ -213,6 +215,16 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
             joining=plan.joining,
         )
     policy = judged.load()
+    if isinstance(judged, PlannedPolicy):
+        return measure_loaded(
+            judged.load,
+            observations,
+            cold_repeats=plan.cold,
+            warm_repeats=plan.warm,
+            candidates=candidates_of(policy, plan.samples),
+            project=project,
+            joining=plan.joining.of(judged.name, guided=policy.guided),
+        )
     return measure_policy(
         judged.folder,
         observations,

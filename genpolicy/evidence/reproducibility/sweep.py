@@ -192,7 +192,7 @@ def measure_sweep(
         policies: list[Running] = [own]
         if isinstance(own, NetworkPolicy):
             policies = [sampling_by(own, tried) for tried in swept_samplers(own.sampler, sweep)]
-        else:
+        elif isinstance(own, WirePolicy):
             policies += [own.sampling_by(name) for name in own.samplers]
         return _in_turns(plan, judged.name, policies, seen)
 

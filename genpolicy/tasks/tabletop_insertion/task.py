@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.recording.episode import RecordedEpisode
 from genpolicy.errors import ContractError
@@ -31,6 +32,7 @@ from genpolicy.tasks.tabletop_insertion.observation import (
     PHASES,
 )
 from genpolicy.tasks.tabletop_insertion.picture import draw
+from genpolicy.tasks.tabletop_insertion.planner import plan_insertion
 from genpolicy.tasks.tabletop_insertion.probes import EPOCHS
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start, start_from_json
 from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
@@ -133,6 +135,10 @@ class TabletopInsertion:
             gripper_opening_m=float(action[GRIPPER]),
             post_y_m=float(world.observe()[OBSERVATION.slices["post_position_m"]][0]),
         )
+
+    def planner(self, history: Array, *, horizons: HorizonConfig) -> Array:
+        """A chunk (K, 10) of the classical planner, from what every policy sees (H_o, 24)."""
+        return plan_insertion(history, horizons=horizons)
 
     def episode_specs(
         self, root_seed: int, episodes: int, *, shares: Mapping[str, float] | None = None

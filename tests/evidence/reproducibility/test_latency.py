@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from genpolicy.candidates.planned import planned
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.evidence.reproducibility import latency
@@ -15,14 +17,17 @@ from genpolicy.evidence.reproducibility.latency import (
     LEVELS,
     PROCESSES,
     RUNS,
+    LatencyPlan,
     declared_rows,
     latency_models,
     measure_all,
+    measure_terms,
     model_rows,
 )
 from genpolicy.evidence.reproducibility.processor import Machine
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm
+from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.seeds import stream
 
 DECLARED = {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS}
@@ -215,3 +220,23 @@ def test_of_a_method_with_one_unknown_wait_nothing_is_said_without_it():
     rows = model_rows(measured(lambda *_: 0.001, waits=some), DECLARED, root_seed=1)
     assert len(rows) == 12
     assert all(row.measured_running_s is None and row.drawn_running_s is None for row in rows)
+
+
+def test_a_planner_is_timed_like_everybody_and_what_it_does_not_do_takes_hardly_any_time(dataset):
+    horizons = HorizonConfig(
+        observation_horizon=2, prediction_horizon=16, execution_horizon=8, action_period_s=0.05
+    )
+    plan = LatencyPlan(
+        dataset=dataset, task="tabletop_insertion", feasibility=FeasibilitySettings(),
+        horizons=horizons, samples=4, warm=3, cold=2,
+    )  # fmt: skip
+    rows = measure_terms(plan, planned(plan.task, horizons, seed=0))
+    found = {(row.component, row.temperature, row.repeat) for row in rows}
+    repeats = [("cold", 0), ("cold", 1), ("warm", 0), ("warm", 1), ("warm", 2)]
+    asked = {(str(term), *repeat) for term in MEASURED_TERMS for repeat in repeats}
+    assert found == asked and len(rows) == len(asked) and all(row.seconds > 0 for row in rows)
+    took = {
+        name: sum(row.seconds for row in rows if row.component == name)
+        for name in ("encode", "sample")
+    }
+    assert took["encode"] < took["sample"]

@@ -4,12 +4,14 @@ import json
 from types import SimpleNamespace
 
 import evidence
+import pandas as pd
 import pytest
 
 from gates.card.rollback import require_rollback, rollback_of
 from gates.evidence import Evidence
 from gates.proof import judge
 from gates.report import read_report
+from genpolicy.contract.planner import PLANNER, planner_sha256
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_file
@@ -71,3 +73,21 @@ def test_sixty_signs_of_another_rollback_are_shown(monkeypatch, length):
     require_rollback("y", {}, None)
     with pytest.raises(IntegrityError, match=rf"rollback is 'x{{{min(length, 60)}}}', expected y"):
         require_rollback("x" * length, {}, None)
+
+
+def test_the_planner_is_named_by_the_task_since_it_has_no_weights(ladder):
+    def beside(frame):
+        own = frame[frame["method"] == "bc"].assign(method=PLANNER, success=True, outcome="success")
+        return pd.concat([frame, own], ignore_index=True)
+
+    evidence.edit_table(ladder, ROLLOUTS, beside)
+    known = reports(ladder)
+    settings = known["D"].settings
+    named = {**settings, "baselines": [*settings["baselines"], PLANNER]}
+    known["D"] = known["D"].model_copy(update={"settings": named})
+    found = rollback_of(known, Evidence(ladder))
+    assert found.policy == PLANNER and found.succeeded == found.rollouts
+    assert found.checkpoint_sha256 == planner_sha256(evidence.TASK["sha256"])
+    (ladder / "artifacts/task/identity.json").unlink()
+    with pytest.raises(IntegrityError, match="the task whose planner did best"):
+        rollback_of(known, Evidence(ladder))

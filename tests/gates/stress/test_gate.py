@@ -1,6 +1,7 @@
 """Gate D: the least evidence over the baselines, and the best of them."""
 
 import evidence
+import pandas as pd
 import pytest
 from asked import asked, settings_of
 
@@ -8,7 +9,8 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
 from gates.stress.gate import best_baseline, promotion_e_value
 from gates.stress.pairs import paired_differences
-from gates.stress.rollouts import REFUSED
+from gates.stress.rollouts import REFUSED, UNPLANNED
+from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import write_rows
@@ -67,3 +69,30 @@ def test_what_layers_refused_is_bound(ladder):
     write_rows(table, RefusedRow, [])
     evidence.record(ladder)
     assert judge(ladder, "D").materials[REFUSED] == sha256_file(table)
+
+
+def _with_planner(root):
+    """It succeeds on every start, which no candidate does; of the others nothing changes."""
+    evidence.write_params(root, lambda p: p["stress"]["baselines"].append(PLANNER))
+
+    def beside(frame):
+        own = frame[frame["method"] == "bc"].assign(method=PLANNER, success=True, outcome="success")
+        return pd.concat([frame, own], ignore_index=True)
+
+    evidence.edit_table(root, TABLE, beside)
+    return Evidence(root), settings_of(root, "D")
+
+
+def test_who_does_no_better_than_the_planner_alone_is_not_promoted(ladder):
+    before = asked(ladder, promotion_e_value, "flow", gate="D")
+    reader, settings = _with_planner(ladder)
+    assert before.value >= 1.0 / settings.alpha, "over all others a gain is shown"
+    found = asked(ladder, promotion_e_value, "flow", gate="D")
+    assert found.value < 1.0 and f"against {PLANNER}" in found.caveat
+    assert best_baseline(reader, settings) == PLANNER
+
+
+def test_a_comparison_without_a_planner_says_so(ladder):
+    assert UNPLANNED in settings_of(ladder, "D").caveats
+    assert UNPLANNED in judge(ladder, "D").caveats
+    assert UNPLANNED not in _with_planner(ladder)[1].caveats
