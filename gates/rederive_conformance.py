@@ -1,8 +1,8 @@
 """What brought policies answered at recorded moments: findings derived again, answers asked again.
 
 The answers of the table give the findings of the document, with moments cut from the dataset again;
-and a sample of the answers is asked of the candidate again. It is drawn by the hash of the table,
-so that nobody who writes one can choose what is asked.
+and a sample of the answers is asked of the candidate again. It is drawn by a hash of all tables of
+the folder (`gates.sampled`).
 """
 
 from collections import defaultdict
@@ -16,6 +16,7 @@ from gates.rederive_brought import brought_policy
 from gates.rederive_draws import TOLERANCE
 from gates.rederive_shadow import TaskSection
 from gates.reproducibility.settings import RELOAD
+from gates.sampled import salt_of, some
 from gates.stated import refuse, root_seed, section
 from genpolicy.candidates.conformance.asked import repeated
 from genpolicy.candidates.conformance.check import question
@@ -26,9 +27,7 @@ from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.documents.conformance import CONFORMANCE, Conformance
 from genpolicy.evidence.reproducibility.conformance import drawn, findings_again, invocation_of
 from genpolicy.evidence.rows.brought import AGAIN, ANEW, FIRST, AnswerRow
-from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
-from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.journal_source import readable
 
@@ -153,15 +152,12 @@ def _ask_again(
     told = (wire.told.seeded, wire.told.counts_evaluations, wire.told.candidates)
     if told != (stated.seeded, stated.counts_evaluations, stated.most_candidates):
         refuse("B", f"{DOCUMENT}: {wire.method}", "other things that its server can", str(told))
-    generator = stream(0, "asked again", wire.method, sha256_file(root / ANSWERS))
+    salt = salt_of((root / RELOAD).glob("*.parquet"))
     apart = [row for row in first if row.moment < starts.apart]
     further = [row for row in first if row.moment >= starts.apart]
     chosen = [
-        part[number]
-        for part in (apart, further)
-        for number in sorted(
-            generator.choice(len(part), min(OF_A_CANDIDATE, len(part)), replace=False).tolist()
-        )
+        *some(apart, OF_A_CANDIDATE, name=f"{wire.method}, apart", salt=salt),
+        *some(further, OF_A_CANDIDATE, name=f"{wire.method}, further", salt=salt),
     ]
     for row in chosen:
         again = wire.sample(
