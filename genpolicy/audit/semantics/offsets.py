@@ -8,6 +8,7 @@ the while; at least one part must be too slow for a lag; and episodes that went 
 both sides.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,7 +26,6 @@ from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.data.formats.units import tokens
 
 # A column that follows its command in fewer episodes stands, or is held by something.
 FOLLOWED = 0.5
@@ -49,6 +49,7 @@ CARRIED = {
     *("load", "payload", "mass", "weight", "tool", "gripper", "finger", "fingers", "object"),
     *("material", "stiffness", "compliance", "impedance", "damping", "gain", "gains", "kp", "kd"),
 }
+WORDS = re.compile("[a-z]+")
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,7 @@ def explained(
     said += [
         item.values[known]
         for item in data.variables
-        if not item.by_row and CARRIED & {*tokens(item.name)}
+        if not item.by_row and CARRIED & {*WORDS.findall(item.name.lower())}
     ]
     return any(_told(_same(values), own) > TOLD for values in said)
 
