@@ -11,6 +11,7 @@ from gates.report import Answer
 from gates.reproducibility.latency_budget import LATENCY, Budget, Spans, budget_of
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from gates.words import duration, length, span
+from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import RolloutRow, SpliceRow, StressCountRow
 
@@ -111,7 +112,8 @@ def _jumps(look: Look) -> None:
     simple = {
         name: _p95(look, every[every["method"] == name], "raw_jump_m", "as proposed", name)
         for name in settings.baselines
-        if (every["method"] == name).any()
+        # A planner begins where it sees the arm, which lies behind what was commanded last.
+        if name != PLANNER and (every["method"] == name).any()
     }
     if not simple:
         raise MissingEvidenceError(f"{SPLICES} has no simple policy to compare with")

@@ -92,7 +92,7 @@ def in_comparison(
     task: str,
     horizons: HorizonConfig,
 ) -> list[Contender]:
-    """The planner, baselines, trained candidates, brought ones: who stands in the comparison.
+    """Baselines in their order, trained candidates, brought ones: who stands in the comparison.
 
     Args:
         artifacts: Folder of the stages' outputs.
@@ -112,8 +112,10 @@ def in_comparison(
     own = [name for name in candidates if name not in others]
     learned = [name for name in baselines if name != PLANNER]
     ours = compared(artifacts, baselines=learned, generators=own, seed=seed, device=device)
-    return [
-        *([planned(task, horizons, seed=seed)] if PLANNER in baselines else []),
+    everybody: list[Contender] = [
         *ours,
         *(policy for policy in brought if policy.name in candidates),
     ]
+    if PLANNER in baselines:
+        everybody.insert(list(baselines).index(PLANNER), planned(task, horizons, seed=seed))
+    return everybody

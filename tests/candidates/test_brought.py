@@ -5,6 +5,7 @@ import yaml
 
 from genpolicy.candidates.brought import read_brought, require_brought
 from genpolicy.candidates.contenders import admitted_contenders, in_comparison
+from genpolicy.contract.planner import PLANNER
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import sha256_file
 from tests.candidates.conftest import ENTRY
@@ -142,11 +143,12 @@ def test_who_stands_is_who_was_admitted_in_its_order(fleet, brought, tmp_path):
     assert [one.name for one in found] == ["planted", "flow"]
     assert admitted_contenders(tmp_path, ["flow"], others, seed=0, device="cpu")[0].name == "flow"
     compared = in_comparison(
-        tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0,
-        device="cpu",
+        tmp_path, baselines=["bc", PLANNER], candidates=["flow", "planted"], brought=others, seed=0,
+        device="cpu", task="tabletop_insertion", horizons=HORIZONS,
     )  # fmt: skip
-    assert [one.name for one in compared] == ["bc", "flow", "planted"]
+    assert [one.name for one in compared] == ["bc", PLANNER, "flow", "planted"]
     only = in_comparison(
-        tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0, device="cpu"
-    )
+        tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0, device="cpu",
+        task="tabletop_insertion", horizons=HORIZONS,
+    )  # fmt: skip
     assert [one.name for one in only] == ["bc", "flow"]

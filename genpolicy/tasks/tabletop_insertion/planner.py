@@ -92,8 +92,10 @@ class _Seen:
 
 def _approach(seen: _Seen, rows: int, period_s: float) -> Rows:
     """Along the way around the post; what the arm is beside it fades."""
-    way = _way(seen)
-    length, at = way
+    hover = np.append(seen.hole_m, HOVER_Z_M)
+    if np.linalg.norm(hover - seen.tcp_m) < FINE_M:  # no way is left to go round anything
+        return _straight(seen, hover, rows, period_s, TRAVEL), _held(rows)
+    length, at = _way(seen)
     dense = np.linspace(0.0, length, 400)
     points = at(dense)
     nearest = int(np.argmin(np.linalg.norm(points - seen.tcp_m, axis=1)))

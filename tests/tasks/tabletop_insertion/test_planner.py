@@ -10,7 +10,13 @@ from genpolicy.tasks.api import WorldSettings, load_task
 from genpolicy.tasks.planner import planner_of
 from genpolicy.tasks.tabletop_insertion import scene
 from genpolicy.tasks.tabletop_insertion.observation import OBSERVATION, PHASES, one_hot
-from genpolicy.tasks.tabletop_insertion.planner import RING, RING_M, plan_insertion
+from genpolicy.tasks.tabletop_insertion.planner import (
+    FINE_M,
+    HOVER_Z_M,
+    RING,
+    RING_M,
+    plan_insertion,
+)
 
 HORIZONS = HorizonConfig(
     observation_horizon=2, prediction_horizon=16, execution_horizon=8, action_period_s=0.05
@@ -106,3 +112,11 @@ def test_from_starts_of_the_task_it_inserts_and_withdraws():
                 world.advance()
                 assert not world.collision and world.contact_force_n < 40.0
         assert world.success, (seed, world.phase, world.last_action[POSITION])
+
+
+@pytest.mark.parametrize("phase", ["approach", "recover"])
+def test_where_no_way_is_left_it_stays(phase):
+    """Wrong before: exactly above the hole there was one knot, and no spline through it."""
+    hover_m = np.append(HOLE_M, HOVER_Z_M)
+    chunk = planned(phase, hover_m)
+    assert np.allclose(chunk[:, POSITION], hover_m, rtol=0.0, atol=FINE_M)
