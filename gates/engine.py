@@ -4,7 +4,6 @@ Pure: the report is a function of the evidence, the limits and the settings.
 """
 
 import contextlib
-import functools
 import importlib.metadata
 import math
 import platform
@@ -334,17 +333,10 @@ def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list
 
 def environment() -> dict[str, str]:
     """Versions of installed libraries and the regime of the numbers: part of what is derived."""
-    found = dict(_installed())
+    found = {}
+    for name in LIBRARIES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            found[name] = importlib.metadata.version(name)
     found["python"] = ".".join(platform.python_version_tuple()[:2])
     found["regime"] = REGIME
     return found
-
-
-@functools.cache
-def _installed() -> tuple[tuple[str, str], ...]:
-    """Version of each library; what is imported stays what it was while the process lives."""
-    found = []
-    for name in LIBRARIES:
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            found.append((name, importlib.metadata.version(name)))
-    return tuple(found)
