@@ -138,8 +138,7 @@ class Reasons:
 
     def recorded(self) -> Recorded:
         """What varies; a value that is the same everywhere tells nothing."""
-        found = self._found()
-        kept = {name: runs for name, runs in found.items() if not self._is_signal(name)}
+        kept = self._lasting()
         if self._session in kept and self._names_each(kept[self._session]):
             del kept[self._session]
         for name in self._measured(kept):
@@ -160,7 +159,7 @@ class Reasons:
             (wide, f"more than {WIDEST} numbers wide"),
             (signals, "changes row by row"),
             (judging, "counts rows or comes of the episode"),
-            (self._measured(self._found()), "measured in the episode, another number in most"),
+            (self._measured(self._lasting()), "measured in the episode, another number in most"),
             (sorted(self._cut), f"all but the first {MOST_ELEMENTS} numbers that are not observed"),
             (self._vectors.overfull(), f"more than {MOST_DIFFERENT} different rows"),
             (sorted(self._many), f"all but the first {MAXIMUM_LEAVES} of its parts"),
@@ -170,12 +169,13 @@ class Reasons:
                 notes.append(f"Not looked at as a reason, {why}: {_listed(names)}.")
         return notes + self._interventions.notes(self.recorded())
 
-    def _found(self) -> dict[str, dict[str, Runs]]:
+    def _lasting(self) -> dict[str, dict[str, Runs]]:
+        """What was recorded and is no signal."""
         found = self._vectors.recorded()
         for name, runs in self._runs.items():
             # A text in some episodes and a list of numbers in others is one column of texts.
             found[name] = found.get(name, {}) | runs
-        return found
+        return {name: runs for name, runs in found.items() if not self._is_signal(name)}
 
     def _measured(self, found: Recorded) -> list[str]:
         """What is called a statistic of motion or load, and is another number in most episodes."""

@@ -313,3 +313,11 @@ def test_a_limit_that_was_set_is_asked_and_what_was_measured_is_not():
         "Not looked at as a reason, measured in the episode, another number in most: "
         "info/mean_torque[1], max_force."
     ]
+
+
+def test_a_signal_by_the_name_of_a_measurement_is_noted_once():
+    reasons = Reasons(PUSHT)
+    for k in range(8):
+        force = np.arange(9.0) if k < 4 else np.full(9, k / 10)
+        reasons.add(RawEpisode(str(k), "", {"max_force": force}), str(k))
+    assert reasons.notes([]) == ["Not looked at as a reason, changes row by row: max_force."]
