@@ -11,6 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 import evidence
+from made_before import nothing_made_twice
 
 from gates.card.card import card_bytes
 from gates.card.drafting import draft
@@ -48,7 +49,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         return (yield)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(clustered, "DRAWS", 200)
-        return (yield)
+        with nothing_made_twice():
+            return (yield)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,108 @@
+"""What was made before of the same bytes: answers of criteria and figures of pages, given again.
+
+Both are functions of the files that they read and of what else they are given. Most tests change
+one file of a whole ladder and judge or print all of it, and what did not read that file is as it
+was. So within one process it is given again where every file that it read has the same hash as
+then; where any differs, and in every test that puts something else in the place of a function or a
+constant, it is made. `FRESH=1` makes everything always.
+"""
+
+import os
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import pytest
+
+from gates import engine
+from gates.criterion import Criterion
+from gates.evidence import Evidence
+from gates.pages.figures import Listing, Plot, Series
+from gates.report import Answer, GateReport
+from gates.settings import GateSettings, Limit
+
+Made = TypeVar("Made")
+MISSING = ""
+BESIDE = ("gates.rederive.rederive", "gates.printed.", "gates.report.")
+"""Whatever stands in the place of these, no criterion and no figure calls it."""
+PICTURED = (Plot, Series, Listing)
+_answer = engine._answer
+_picture: dict[type, Callable[..., dict[str, Any]]] = {kind: kind.picture for kind in PICTURED}
+_known: dict[Hashable, list[tuple[dict[str, str], Any]]] = {}
+_replaced: list[object] = []
+_said: dict[int, tuple[object, str]] = {}
+
+
+@contextmanager
+def nothing_made_twice() -> Iterator[None]:
+    """Around one test."""
+    if os.environ.get("FRESH"):
+        yield
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "_answer", answer)
+        for kind in PICTURED:
+            patch.setattr(kind, "picture", picture)
+        for name in ("setattr", "setitem"):
+            patch.setattr(pytest.MonkeyPatch, name, _noting(getattr(pytest.MonkeyPatch, name)))
+        _replaced.clear()
+        yield
+
+
+def _noting(change: Callable[..., None]) -> Callable[..., None]:
+    def noted(self: pytest.MonkeyPatch, target: Any, *others: Any, **named: Any) -> None:
+        if not (isinstance(target, str) and target.startswith(BESIDE)):
+            _replaced.append(target)
+        change(self, target, *others, **named)
+
+    return noted
+
+
+def answer(
+    item: Criterion, evidence: Evidence, inputs: Any, limit: Limit | None, candidate: str | None
+) -> Answer:
+    """In the place of `gates.engine._answer`."""
+
+    def measure() -> Answer:
+        return _answer(item, evidence, inputs, limit, candidate)
+
+    if not isinstance(inputs, GateSettings):
+        return measure()
+    return _again((item, _in_words(inputs), limit, candidate), evidence, measure)
+
+
+def picture(plot: Any, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+    """In the place of `picture` of what a page shows."""
+    key = (plot, _in_words(report), salt)
+    return _again(key, evidence, lambda: _picture[type(plot)](plot, evidence, report, salt))
+
+
+def _again(key: Hashable, evidence: Evidence, make: Callable[[], Made]) -> Made:
+    if _replaced:
+        return make()
+    known = _known.setdefault(key, [])
+    for read, made in known:
+        if all(_digest(evidence, name) == digest for name, digest in read.items()):
+            evidence._touched |= dict.fromkeys(read)
+            return made
+    with evidence.recorded() as paths:
+        found = make()
+    known.append(({name: _digest(evidence, name) for name in paths}, found))
+    return found
+
+
+def _digest(evidence: Evidence, name: str) -> str:
+    """Hash of a file as it is bound, by which it counts among the report's materials."""
+    bound = name in evidence._materials or evidence.bind(name)
+    return evidence._materials[name] if bound else MISSING
+
+
+def _in_words(thing: Any) -> str:
+    """All that settings or a report say, and the limits that a gate judges by."""
+    kept = _said.get(id(thing))
+    if kept is None or kept[0] is not thing:
+        if len(_said) > 50:
+            _said.clear()
+        limits = getattr(thing, "_held_to", None)
+        kept = _said[id(thing)] = (thing, f"{thing!r} {limits!r}")
+    return kept[1]

@@ -1,0 +1,110 @@
+"""What is given again is what would be made; whatever could make it another one is seen."""
+
+import evidence
+import made_before
+import pytest
+import yaml
+
+from gates import engine
+from gates.criterion import Measured
+from gates.pages.figures import Plot
+from gates.pages.printing import printed_beside
+from gates.proof import judge
+from gates.report import report_bytes
+from gates.settings import read_params
+from gates.stress import gate as stress
+
+
+@pytest.fixture
+def _made(monkeypatch):
+    """Criteria that were measured and figures that were drawn since; as if nobody replaced it."""
+    made: list[str] = []
+    measure, picture = made_before._answer, made_before._picture[Plot]
+
+    def noted(item, *others):
+        made.append(item.id)
+        return measure(item, *others)
+
+    def drawn(plot, *others):
+        made.append(plot.title)
+        return picture(plot, *others)
+
+    monkeypatch.setattr(made_before, "_answer", noted)
+    monkeypatch.setitem(made_before._picture, Plot, drawn)
+    monkeypatch.setattr(made_before, "_known", {})
+    made_before._replaced.clear()
+    return made
+
+
+def _fresh(root, gate):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "_answer", made_before._answer)
+        return judge(root, gate)
+
+
+def test_the_same_bytes_are_measured_and_drawn_once(ladder, _made):
+    report = judge(ladder, "D")
+    printed = printed_beside(ladder, report)
+    assert len(_made) > len(stress.GATE.criteria)
+    _made.clear()
+    assert judge(ladder, "D") == report
+    assert printed_beside(ladder, report) == printed
+    assert _made == []
+
+
+def test_what_read_a_file_that_changed_is_measured_and_the_rest_is_as_it_was(ladder, _made):
+    judge(ladder, "D")
+    _made.clear()
+    evidence.edit_table(ladder, "stress/recoveries.parquet", lambda rows: rows.iloc[1:])
+    report = judge(ladder, "D")
+    asked = {
+        one.id for one in report.criteria if "artifacts/stress/recoveries.parquet" in one.evidence
+    }
+    assert 0 < len(asked) < len(report.criteria)
+    assert asked == set(_made)
+    assert report_bytes(report) == report_bytes(_fresh(ladder, "D"))
+
+
+def test_a_file_that_is_gone_or_comes_is_another_one(ladder, _made):
+    file = ladder / "artifacts/stress/recoveries.parquet"
+    whole, data = judge(ladder, "D"), file.read_bytes()
+    file.unlink()
+    evidence.record(ladder)
+    without = judge(ladder, "D")
+    assert without.verdict != whole.verdict
+    assert report_bytes(without) == report_bytes(_fresh(ladder, "D"))
+    file.write_bytes(data)
+    evidence.record(ladder)
+    assert judge(ladder, "D") == whole
+
+
+def test_another_setting_is_another_question(ladder, _made):
+    judge(ladder, "D")
+    _made.clear()
+    params = read_params(ladder)
+    (ladder / "params.yaml").write_text(yaml.safe_dump(params | {"confidence": 0.9}))
+    asked = {one.id for one in judge(ladder, "D").criteria}
+    assert asked == set(_made) and len(asked) > 10
+
+
+def test_in_the_place_of_a_function_another_one_answers(ladder, monkeypatch):
+    """As in any test that replaces what a criterion calls: nothing of before is given."""
+    judge(ladder, "C")
+    asked = []
+
+    def counted(*given):
+        asked.append(given)
+        return Measured(0.0)
+
+    monkeypatch.setattr("gates.feasibility.proof.checked_violations", counted)
+    before = len(made_before._known)
+    judge(ladder, "C")
+    assert len(made_before._known) == before
+    assert made_before._replaced
+
+
+def test_a_function_that_no_criterion_calls_is_none(ladder, monkeypatch):
+    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: None)
+    assert not made_before._replaced
+    monkeypatch.setitem(evidence.PARAMS, "none", None)
+    assert made_before._replaced
