@@ -383,7 +383,7 @@ def write_params(root: Path, change: Callable[[dict[str, Any]], Any] | None = No
     params = copy.deepcopy(PARAMS)
     if change:
         change(params)
-    (root / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+    (root / "params.yaml").write_text(yaml.dump(params, Dumper=yaml.CSafeDumper, sort_keys=False))
     record(root)
 
 
@@ -546,7 +546,7 @@ def record(root: Path) -> None:
 @functools.lru_cache(maxsize=4)
 def _read_again(text: str) -> Any:
     """Settings, which few edits of evidence change; do not write into them."""
-    return yaml.safe_load(text)
+    return yaml.load(text, Loader=yaml.CSafeLoader)
 
 
 def _dataset(root: Path) -> None:
