@@ -7,6 +7,7 @@ import yaml
 
 from gates import engine
 from gates.criterion import Measured
+from gates.evidence import Evidence
 from gates.pages.figures import Plot
 from gates.pages.printing import printed_beside
 from gates.proof import judge
@@ -85,6 +86,31 @@ def test_another_setting_is_another_question(ladder, _made):
     (ladder / "params.yaml").write_text(yaml.safe_dump(params | {"confidence": 0.9}))
     asked = {one.id for one in judge(ladder, "D").criteria}
     assert asked == set(_made) and len(asked) > 10
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_a_criterion_reads_nothing_that_it_does_not_name(gate, ladder, tmp_path, monkeypatch):
+    """With every other file empty, but for those of trainings, it answers the same."""
+    asked = []
+
+    def noted(*given):
+        asked.append((given, made_before._answer(*given)))
+        return asked[-1][1]
+
+    monkeypatch.setattr(engine, "_answer", noted)
+    judge(ladder, gate)
+    assert len(asked) > 10
+    for number, ((item, whole, *others), answer) in enumerate(asked):
+        root = tmp_path / str(number)
+        for file in [path for path in (ladder / "artifacts").rglob("*") if path.is_file()]:
+            name = file.relative_to(ladder).as_posix()
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            if name in answer.evidence or made_before.TRAINED in name:
+                (root / name).hardlink_to(file)
+            else:
+                (root / name).touch()
+        own = Evidence(root, whole.basis)
+        assert made_before._answer(item, own, *others) == answer, answer.id
 
 
 def test_in_the_place_of_a_function_another_one_answers(ladder, monkeypatch):
