@@ -89,8 +89,12 @@ def main() -> None:
     parser.add_argument("behaviour")
     parser.add_argument("--asks", type=int)
     parser.add_argument("--answers", type=int)
+    parser.add_argument("--ready", type=int)
     given = parser.parse_args()
     task, inbox, number = load_task("tabletop_insertion"), Inbox(given.asks), 0
+    if given.ready is not None:
+        os.write(given.ready, b".")
+        os.close(given.ready)
     if given.behaviour == "flood":
         flood(inbox, task, given.answers)
         return
