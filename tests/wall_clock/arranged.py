@@ -1,5 +1,6 @@
 """What the tests of the wall clock share: a workspace, a replay, a run, and what became of it."""
 
+import json
 import sys
 import time
 from dataclasses import dataclass
@@ -62,9 +63,11 @@ def request_of(root: Path, replay: Replay) -> WallClockRequest:
     )
 
 
-def scripted(behaviour: str) -> list[str]:
-    """Command of a policy's process that behaves so."""
-    return [sys.executable, str(HERE / "scripted_policy.py"), behaviour]
+def scripted(behaviour: str, replay: Replay) -> list[str]:
+    """Command of a policy's process that behaves so, and keeps the arm where the replay begins."""
+    told = {"checkpoint": CHECKPOINT, "sampler": SAMPLER, "method": "scripted",
+            "action": replay.actions[0]}  # fmt: skip
+    return [sys.executable, str(HERE / "scripted_policy.py"), behaviour, json.dumps(told)]
 
 
 def broken_clock(fault: str) -> list[str]:
@@ -75,7 +78,11 @@ def broken_clock(fault: str) -> list[str]:
 def begun(root, folder, replay, behaviour, supervisor=SUPERVISOR, *, ready=True):
     """A run whose clock begins when the policy's process has loaded, or, not `ready`, at once."""
     return start(
-        folder, request_of(root, replay), scripted(behaviour), supervisor=supervisor, ready=ready
+        folder,
+        request_of(root, replay),
+        scripted(behaviour, replay),
+        supervisor=supervisor,
+        ready=ready,
     )
 
 

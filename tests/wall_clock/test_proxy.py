@@ -76,15 +76,15 @@ def run(root, replay, plan, behaviour="good"):
     return start(
         root / "run",
         request_of(root, replay),
-        scripted(behaviour),
+        scripted(behaviour, replay),
         line=line(root, plan),
         ready=True,
     )
 
 
 @pytest.fixture(scope="module")
-def disturbed(standing, tmp_path_factory) -> Ended:
-    """One run with every fault of the table."""
+def disturbed(standing, sessions, tmp_path_factory) -> Ended:
+    """One run with every fault of the table; what waits for clocks waits beside it."""
     root = workspace(tmp_path_factory.mktemp("line"))
     plan = LinePlan(
         asks=planned({(0, n): fault.ask for n, fault in TABLE.items()}),
