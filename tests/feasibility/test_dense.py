@@ -32,7 +32,7 @@ def test_nothing_admitted_is_wrong_at_any_millisecond():
         (("joint_velocity", "measured_velocity"), ("free", "edge"), "of a joint's speed", 0),
         (("contact_force",), ("down",), " N", 0),
         (("approach_direction",), ("down",), "P6.approach", 0),
-        (("gripper_opening",), ("down", "onto"), "P6.release", 0),
+        (("gripper_opening",), ("down", "onto"), "P6.release", 1),
     ],
 )
 def test_without_a_check_it_objects(gone, kinds, said, seed):
