@@ -1,4 +1,8 @@
-"""A million random events: nothing wrong reaches the controller, and the model is awake."""
+"""A quarter of a million random events: nothing wrong is accepted, and the model is awake.
+
+`make soak` is twenty million of them. The walks here are those in which the planted faults are
+found, so that the rare moments that a check is for are among so few.
+"""
 
 import pytest
 from soak import soak
@@ -6,31 +10,30 @@ from soak import soak
 from genpolicy.evidence.shadow.rig import IMITATED
 from genpolicy.execution.checks import without
 
-EVENTS = 250_000
+EVENTS, SEARCHED = 40_000, 20_000
+PLANTED = [
+    ("continuity", "m from the last command", 2),
+    ("continuity", "goes on after a hold", 0),
+    ("pace", "too soon after the last command", 43),
+    ("stopped", "a command while stopped", 0),
+    ("intervention", "a command while a person commands", 1),
+    ("phase_transition", "of another phase or calibration", 0),
+    ("expired", "later than its validity", 0),
+    ("stale_observation late_chunk", "older than allowed", 2),
+    ("late_chunk", "begins late in contact", 22),
+    ("after_stop", "conditioned before a voiding event", 11),
+]
+"""Checks that are taken away, what is said of it, and the seed in whose walk it is."""
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", sorted({seed for *_, seed in PLANTED}))
 def test_nothing_wrong_reaches_the_controller(seed):
     found = soak(seed, EVENTS)
     assert found.wrongs == []
     assert found.events >= EVENTS and found.commands > EVENTS / 20
 
 
-@pytest.mark.parametrize(
-    ("check", "said", "first"),
-    [
-        ("continuity", "m from the last command", 0),
-        ("continuity", "goes on after a hold", 0),
-        ("pace", "too soon after the last command", 43),
-        ("stopped", "a command while stopped", 0),
-        ("intervention", "a command while a person commands", 0),
-        ("phase_transition", "of another phase or calibration", 0),
-        ("expired", "later than its validity", 0),
-        ("stale_observation late_chunk", "older than allowed", 2),
-        ("late_chunk", "begins late in contact", 22),
-        ("after_stop", "conditioned before a voiding event", 7),
-    ],
-)
+@pytest.mark.parametrize(("check", "said", "first"), PLANTED)
 def test_without_a_check_the_model_objects(check, said, first):
     """Each is found by the model or, first, by the checker; alone in its own words.
 
@@ -38,7 +41,7 @@ def test_without_a_check_the_model_objects(check, said, first):
     """
     table, wrongs = without(IMITATED, *check.split()), []
     for seed in range(first, first + 40):
-        wrongs += soak(seed, 20_000, table).wrongs
+        wrongs += soak(seed, SEARCHED, table).wrongs
         if any(said in wrong for wrong in wrongs):
             break
     assert any(said in wrong for wrong in wrongs), wrongs[:5]

@@ -221,6 +221,9 @@ class Eye:
         model.geom_margin[:] = 0.002  # what is this close is listed, touching or not
         self.box = np.array([cell.workspace.lower_m, cell.workspace.upper_m])
         self.worst: dict[str, float] = {}
+        self.groups, self.bodies = model.geom_group.tolist(), model.geom_bodyid.tolist()
+        self.mocap: dict[str, int] = {}
+        self.meets: dict[tuple[int, int], bool] = {}
 
     def place(self, q, opening, held, scene):
         """Put arm, fingers, scene and what is held where they are."""
@@ -228,7 +231,9 @@ class Eye:
         data.qpos[: self.joints] = q
         data.qpos[self.fingers] = max(opening, HALF_WIDTH_M) if held else opening
         for name, (position, quaternion) in scene.bodies.items():
-            mocap = int(model.body_mocapid[model.body(name).id])
+            if name not in self.mocap:
+                self.mocap[name] = int(model.body_mocapid[model.body(name).id])
+            mocap = self.mocap[name]
             data.mocap_pos[mocap], data.mocap_quat[mocap] = position, quaternion
         mujoco.mj_kinematics(model, data)
         data.qpos[self.peg : self.peg + 3] = (0.0, 0.0, 50.0)
@@ -243,22 +248,27 @@ class Eye:
     def touching(self, phase, clearance_m, *, commanded=True):
         """The first pair that is nearer than it may be, or what is pressed too hard."""
         model, contact, pressed_m = self.model, self.data.contact, 0.0
-        for i in range(self.data.ncon):
-            pair = [int(geom) for geom in contact.geom[i]]
-            groups = {int(model.geom_group[geom]) for geom in pair}
-            if SCENE not in groups and self.own.may_meet(*pair):
+        for (a, b), dist_m in zip(contact.geom.tolist(), contact.dist.tolist(), strict=True):
+            groups = {self.groups[a], self.groups[b]}
+            if SCENE not in groups and self._may_meet(a, b):
                 continue
-            into_target = groups == {HELD, SCENE} and self.target in model.geom_bodyid[pair]
+            bodies = (self.bodies[a], self.bodies[b])
+            into_target = groups == {HELD, SCENE} and self.target in bodies
             if phase in self.contact_phases and into_target:
-                pressed_m = max(pressed_m, -float(contact.dist[i]))
+                pressed_m = max(pressed_m, -dist_m)
                 continue
-            lacking_m = clearance_m - float(contact.dist[i])
+            lacking_m = clearance_m - dist_m
             self._saw("lacking of the clearance, m", lacking_m)
             if lacking_m > TOUCH_M:
-                return f"{model.geom(pair[0]).name} and {model.geom(pair[1]).name}, {lacking_m:.2g}"
+                return f"{model.geom(a).name} and {model.geom(b).name}, {lacking_m:.2g}"
         pressed_n = STIFFNESS_N_M * (pressed_m - TOUCH_M)
         hard = commanded and pressed_n > self.force_n.get(phase, 0.0)
         return f"{pressed_n:.3g} N" if hard else ""
+
+    def _may_meet(self, a, b):
+        if (a, b) not in self.meets:
+            self.meets[a, b] = self.own.may_meet(a, b)
+        return self.meets[a, b]
 
     def objections(self, admitted):
         """What is wrong with an admitted chunk; nothing if it is as it should be."""

@@ -1,5 +1,6 @@
 """What the tests of the wall clock share: a workspace, a replay, a run, and what became of it."""
 
+import json
 import sys
 import time
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ HERE = Path(__file__).parent
 GUARD_S = 120.0
 """After so long something hangs; nothing is judged by how long it took, s."""
 PERIOD_S = 0.2
+POLL_S = 0.1
 SLOW = {"deadline_s": 1.2, "watchdog_s": 2.0, "maximum_age_s": 1.3, "silence_stop_s": 4.0}
 
 
@@ -61,9 +63,11 @@ def request_of(root: Path, replay: Replay) -> WallClockRequest:
     )
 
 
-def scripted(behaviour: str) -> list[str]:
-    """Command of a policy's process that behaves so."""
-    return [sys.executable, str(HERE / "scripted_policy.py"), behaviour]
+def scripted(behaviour: str, replay: Replay) -> list[str]:
+    """Command of a policy's process that behaves so, and keeps the arm where the replay begins."""
+    told = {"checkpoint": CHECKPOINT, "sampler": SAMPLER, "method": "scripted",
+            "action": replay.actions[0]}  # fmt: skip
+    return [sys.executable, str(HERE / "scripted_policy.py"), behaviour, json.dumps(told)]
 
 
 def broken_clock(fault: str) -> list[str]:
@@ -71,8 +75,34 @@ def broken_clock(fault: str) -> list[str]:
     return [sys.executable, str(HERE / "supervisor_on_a_broken_clock.py"), fault]
 
 
-def begun(root, folder, replay, behaviour, supervisor=SUPERVISOR):
-    return start(folder, request_of(root, replay), scripted(behaviour), supervisor=supervisor)
+def begun(root, folder, replay, behaviour, supervisor=SUPERVISOR, *, ready=True):
+    """A run whose clock begins when the policy's process has loaded, or, not `ready`, at once."""
+    return start(
+        folder,
+        request_of(root, replay),
+        scripted(behaviour, replay),
+        supervisor=supervisor,
+        ready=ready,
+    )
+
+
+def linked(pinned: Path, root: Path) -> Path:
+    """The pinned workspace; a folder of runs of its own."""
+    for name in (LIMITS, "fixtures.yaml"):
+        (root / name).write_bytes((pinned / name).read_bytes())
+    return root
+
+
+def lasting(replay: Replay, rows: int) -> Replay:
+    """The replay again and again, until it has so many rows."""
+    times = -(-rows // len(replay))
+    many = {name: (getattr(replay, name) * times)[:rows]
+            for name in ("phases", "observations", "actions", "forces_n")}  # fmt: skip
+    return replay.model_copy(update=many)
+
+
+def has(found: list[Any], kind: str, times: int = 1) -> bool:
+    return sum(event.kind == kind for event in found) >= times
 
 
 def events(folder: Path, number: int = 0) -> list[Any]:
@@ -83,7 +113,7 @@ def events(folder: Path, number: int = 0) -> list[Any]:
 def wait_for(happened) -> Any:
     """The first answer that is not empty; what never comes is ended as a test that hangs."""
     while not (found := happened()):
-        time.sleep(0.02)
+        time.sleep(POLL_S)
     return found
 
 

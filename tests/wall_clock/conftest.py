@@ -8,6 +8,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from arranged import still_replay, workspace
+from together import beginning
 
 from genpolicy.tasks.api import load_task
 
@@ -22,3 +23,9 @@ def standing():
 def pinned(tmp_path_factory):
     """A workspace with slow limits, pinned: a busy machine must not decide a test."""
     return workspace(tmp_path_factory.mktemp("pinned"))
+
+
+@pytest.fixture(scope="module")
+def sessions(request, pinned, standing, tmp_path_factory):
+    """What runs of the tests that are marked `together`."""
+    yield from beginning(request, pinned, standing, tmp_path_factory)

@@ -1,6 +1,10 @@
-"""A policy's process that keeps the arm where it was commanded to be, and misbehaves on request."""
+"""A policy's process that keeps the arm where it was told to, and misbehaves on request.
+
+It loads nothing of the task, so that it is up at once.
+"""
 
 import argparse
+import json
 import os
 import select
 import signal
@@ -9,8 +13,6 @@ import time
 
 import numpy as np
 
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER
-from genpolicy.tasks.api import load_task
 from genpolicy.wall_clock.channel import HEADER, MAGIC, MAXIMUM_PAYLOAD_BYTES, Inbox, frame
 from genpolicy.wall_clock.messages import Answer, Ask, Operator, Order
 
@@ -22,11 +24,11 @@ def send(descriptor: int, data: bytes) -> None:
         data = data[os.write(descriptor, data) :]
 
 
-def answer_to(ask: Ask, task, **changes) -> Answer:
-    actions = np.tile(task.action_at(ask.observations[-1]), (ROWS, 1))
-    said = {"invocation": ask.invocation, "checkpoint": CHECKPOINT, "sampler": SAMPLER,
-            "method": "scripted", "actions": actions}  # fmt: skip
-    return Answer(**(said | changes))
+def answer_to(ask: Ask, told: dict) -> Answer:
+    """What is told to be answered: checkpoint, sampler, method, and an action for every row."""
+    actions = np.tile(told["action"], (ROWS, 1))
+    rest = {name: told[name] for name in ("checkpoint", "sampler", "method")}
+    return Answer(invocation=ask.invocation, actions=actions, **rest)
 
 
 def misbehave(behaviour: str, number: int, good: Answer, out: int) -> None:
@@ -67,14 +69,14 @@ def answer_to_like(good: Answer, **changes) -> Answer:
     return Answer(**(vars(good) | changes))
 
 
-def flood(inbox: Inbox, task, out: int) -> None:
+def flood(inbox: Inbox, told: dict, out: int) -> None:
     """Answers well, and between answers fills the pipe with copies and noise, without end."""
     os.set_blocking(out, False)
     noise, number = frame(b"{}") + b"noise" + MAGIC, 0
     while not inbox.closed:
         for payload in inbox.read():
             os.set_blocking(out, True)
-            copy = frame(answer_to(Ask.decoded(payload), task).encoded())
+            copy = frame(answer_to(Ask.decoded(payload), told).encoded())
             send(out, copy * 50)
             os.set_blocking(out, False)
             number += 1
@@ -87,17 +89,22 @@ def flood(inbox: Inbox, task, out: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("behaviour")
+    parser.add_argument("told", type=json.loads)
     parser.add_argument("--asks", type=int)
     parser.add_argument("--answers", type=int)
+    parser.add_argument("--ready", type=int)
     given = parser.parse_args()
-    task, inbox, number = load_task("tabletop_insertion"), Inbox(given.asks), 0
+    told, inbox, number = given.told, Inbox(given.asks), 0
+    if given.ready is not None:
+        os.write(given.ready, b".")
+        os.close(given.ready)
     if given.behaviour == "flood":
-        flood(inbox, task, given.answers)
+        flood(inbox, told, given.answers)
         return
     while not inbox.closed:
         select.select([inbox.descriptor], [], [])
         for payload in inbox.read():
-            good = answer_to(Ask.decoded(payload), task)
+            good = answer_to(Ask.decoded(payload), told)
             misbehave(given.behaviour, number, good, given.answers)
             number += 1
 

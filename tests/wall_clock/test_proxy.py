@@ -9,14 +9,26 @@ from collections import Counter
 from dataclasses import dataclass
 
 import pytest
-from arranged import Ended, ended, events, request_of, scripted, violations, wait_for, workspace
-from test_run import has, linked, longer
+from arranged import (
+    Ended,
+    ended,
+    events,
+    has,
+    lasting,
+    linked,
+    request_of,
+    scripted,
+    violations,
+    wait_for,
+    workspace,
+)
+from together import together
 
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.wall_clock.proxy import LinePlan, planned
 from genpolicy.wall_clock.run import PROXY, start
 
-ROWS_TIMES = 5
+ROWS = 150
 BEYOND_S, WITHIN_S = 1.9, 0.5
 """Beyond the deadline of `arranged`, and within it."""
 
@@ -61,18 +73,24 @@ def line(folder, plan: LinePlan) -> list[str]:
 
 
 def run(root, replay, plan, behaviour="good"):
-    return start(root / "run", request_of(root, replay), scripted(behaviour), line=line(root, plan))
+    return start(
+        root / "run",
+        request_of(root, replay),
+        scripted(behaviour, replay),
+        line=line(root, plan),
+        ready=True,
+    )
 
 
 @pytest.fixture(scope="module")
-def disturbed(standing, tmp_path_factory) -> Ended:
-    """One run with every fault of the table."""
+def disturbed(standing, sessions, tmp_path_factory) -> Ended:
+    """One run with every fault of the table; what waits for clocks waits beside it."""
     root = workspace(tmp_path_factory.mktemp("line"))
     plan = LinePlan(
         asks=planned({(0, n): fault.ask for n, fault in TABLE.items()}),
         answers=planned({(0, n): fault.answer for n, fault in TABLE.items()}),
     )
-    return ended(run(root, longer(standing, ROWS_TIMES), plan))
+    return ended(run(root, lasting(standing, ROWS), plan))
 
 
 def fate(seen: Ended, number: int) -> tuple[str, str]:
@@ -100,7 +118,7 @@ def test_the_invariants_hold_and_every_answer_too_many_is_counted(disturbed):
     outcome = disturbed.outcome
     assert disturbed.violations == set()
     assert (outcome["stale"], outcome["invalid"], outcome["conservation_error"]) == (0, 0, 0)
-    assert outcome["ticks"] + outcome["missed"] == ROWS_TIMES * 30
+    assert outcome["ticks"] + outcome["missed"] == ROWS
     # A policy that is slow to start misses deadlines before the table begins, and answers then.
     missed = Counter(
         e.payload["id"] for e in disturbed.events
@@ -122,26 +140,24 @@ def test_an_action_of_a_delayed_answer_is_as_old_as_it_was_long_on_the_way(distu
     assert youngest(delayed) >= WITHIN_S * 1e9
 
 
-def test_a_line_without_a_plan_changes_nothing(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    seen = ended(run(root, longer(standing, 2), LinePlan()))
+@together
+def test_a_line_without_a_plan_changes_nothing(root, standing):
+    seen = ended(run(root, lasting(standing, 2 * len(standing)), LinePlan()))
     assert seen.violations == set() and seen.outcome["accepted"] > 0
     assert seen.outcome["conservation_error"] == 0
 
 
-def test_what_is_no_message_is_passed_on_and_refused_where_it_arrives(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    seen = ended(run(root, longer(standing, 2), LinePlan(), "no_json"))
+@together
+def test_what_is_no_message_is_passed_on_and_refused_where_it_arrives(root, standing):
+    seen = ended(run(root, lasting(standing, 2 * len(standing)), LinePlan(), "no_json"))
     assert seen.violations == set()
     assert seen.outcome["dropped"]["malformed"] > 0
 
 
-def test_a_policy_that_is_killed_in_the_middle_of_its_chunk_moves_nothing_more(
-    pinned, standing, tmp_path
-):
+@together
+def test_a_policy_that_is_killed_in_the_middle_of_its_chunk_moves_nothing_more(root, standing):
     """Rows that were admitted before may still be executed: they were checked. Then it holds."""
-    root = linked(pinned, tmp_path)
-    running = run(root, longer(standing, 3), LinePlan())
+    running = run(root, lasting(standing, 3 * len(standing)), LinePlan())
     wait_for(lambda: has(events(running.folder), "accept"))
     running.policy.kill()
     running.policy.wait()
@@ -161,7 +177,7 @@ def test_other_load_on_every_core_breaks_no_invariant(pinned, standing, tmp_path
     spin = [sys.executable, "-c", "while True: pass"]
     load = [subprocess.Popen(spin) for _ in range(4)]
     try:
-        seen = ended(run(root, longer(standing, 2), LinePlan()))
+        seen = ended(run(root, lasting(standing, 2 * len(standing)), LinePlan()))
     finally:
         for process in load:
             process.kill()

@@ -21,10 +21,13 @@ from arranged import (
     broken_clock,
     ended,
     events,
+    has,
+    lasting,
     violations,
     wait_for,
     workspace,
 )
+from together import together
 
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.wall_clock.messages import Order
@@ -65,9 +68,40 @@ TABLE = (
 )
 
 
+@together
+def test_a_supervisor_that_is_killed_leaves_a_journal_and_begins_stopped(root, standing):
+    running = begun(root, root / "run", standing, "good")
+    wait_for(lambda: has(events(running.folder), "accept"))
+    running.supervisor.kill()
+    with pytest.raises(GenpolicyError, match="died with -9"):
+        running.wait(60.0)
+    assert running.policy.returncode is not None
+    left = events(running.folder)
+    assert has(left, "accept") and not has(left, "end")
+    assert violations(running.folder) == {"journal.no_end"}  # whole, but for its end
+
+    brief = lasting(standing, 15)
+    again = ended(begun(root, root / "run", brief, "good"), number=1)
+    assert again.supervisor() == ["restarted"]
+    assert (again.outcome["accepted"], again.outcome["state"]) == (0, PROTECTIVE)
+    assert again.violations == {"journal.no_end"}  # of the session before
+
+    after = ended(begun(root, root / "run", brief, "good"), number=2)
+    assert (after.supervisor(), after.outcome["accepted"]) == (["restarted"], 0)  # still stopped
+
+    cleared = begun(root, root / "run", lasting(standing, 45), "good")
+    wait_for(lambda: has(events(running.folder, 3), "supervisor"))
+    cleared.say(Order.RESET, "spotter")
+    seen = ended(cleared, number=3)
+    assert seen.supervisor() == ["restarted", "human_reset"]
+    assert seen.outcome["accepted"] > 0
+    fresh = ended(begun(root, root / "run", brief, "good"), number=4)
+    assert fresh.supervisor() == []  # a person has looked
+
+
 @pytest.mark.parametrize("incident", TABLE, ids=lambda row: row.injected)
-def test_a_policy_that_fails_is_held_then_stopped_for(incident, pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
+@together
+def test_a_policy_that_fails_is_held_then_stopped_for(incident, root, standing):
     seen = answered(root, standing, incident.injected)
     outcome = seen.outcome
     assert seen.violations == set()
@@ -83,17 +117,17 @@ def test_a_policy_that_fails_is_held_then_stopped_for(incident, pinned, standing
     assert outcome["ticks"] + outcome["missed"] == len(standing)
 
 
-def test_a_policy_that_answers_is_executed(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
+@together
+def test_a_policy_that_answers_is_executed(root, standing):
     seen = answered(root, standing, "good")
     assert seen.violations == set()
     assert (seen.outcome["state"], seen.outcome["dropped"]) == (RUN, {})
     assert seen.outcome["accepted"] > 0 and seen.outcome["chunks"]["executed"] > 1
 
 
-def test_a_flood_stays_in_its_pipe(pinned, standing, tmp_path):
+@together
+def test_a_flood_stays_in_its_pipe(root, standing):
     """It may keep the policy's own answers from coming in time, and the supervisor from nothing."""
-    root = linked(pinned, tmp_path)
     seen = ended(begun(root, root / "run", standing, "flood"))
     assert seen.violations == set()
     assert seen.outcome["ticks"] + seen.outcome["missed"] == len(standing)
@@ -103,9 +137,9 @@ def test_a_flood_stays_in_its_pipe(pinned, standing, tmp_path):
     assert seen.kinds().count("observation") < 3 * len(standing)  # the flood is in no journal
 
 
-def test_words_of_a_person_from_the_policy_are_no_words_of_a_person(pinned, standing, tmp_path):
+@together
+def test_words_of_a_person_from_the_policy_are_no_words_of_a_person(root, standing):
     """The policy resets, after the operator has stopped: nothing moves any more."""
-    root = linked(pinned, tmp_path)
     running = begun(root, root / "run", standing, "operator")
     wait_for(lambda: has(events(running.folder), "accept"))
     assert running.say(Order.EMERGENCY_STOP, "spotter")
@@ -116,9 +150,9 @@ def test_words_of_a_person_from_the_policy_are_no_words_of_a_person(pinned, stan
     assert seen.violations == set()
 
 
-def test_a_stop_outlives_the_policy_and_ends_with_a_person(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", longer(standing, 3), "good")
+@together
+def test_a_stop_outlives_the_policy_and_ends_with_a_person(root, standing):
+    running = begun(root, root / "run", lasting(standing, 60), "good")
     wait_for(lambda: has(events(running.folder), "accept"))
     running.say(Order.EMERGENCY_STOP, "spotter")
     wait_for(lambda: has(events(running.folder), "supervisor"))
@@ -137,9 +171,9 @@ def test_a_stop_outlives_the_policy_and_ends_with_a_person(pinned, standing, tmp
     assert seen.violations == set()
 
 
-def test_where_nobody_can_stop_it_any_more_it_stops(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", longer(standing, 20), "good")
+@together
+def test_where_nobody_can_stop_it_any_more_it_stops(root, standing):
+    running = begun(root, root / "run", lasting(standing, 20 * len(standing)), "good", ready=False)
     wait_for(lambda: has(events(running.folder), "accept"))
     running.operator.close()
     seen = ended(running)
@@ -149,9 +183,9 @@ def test_where_nobody_can_stop_it_any_more_it_stops(pinned, standing, tmp_path):
 
 
 @pytest.mark.parametrize("fault", ["stands", "back", "ahead", "nan"])
-def test_a_clock_that_is_not_believed_holds_then_stops(fault, pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", longer(standing, 2), "good", broken_clock(fault))
+@together
+def test_a_clock_that_is_not_believed_holds_then_stops(fault, root, standing):
+    running = begun(root, root / "run", lasting(standing, 45), "good", broken_clock(fault))
     seen = ended(running)
     held = {"stands": "no_time", "nan": "no_time", "back": "clock_backwards", "ahead": "stopped"}
     reasons = [e.payload["reason"] for e in seen.events if e.kind == "hold"]
@@ -163,10 +197,10 @@ def test_a_clock_that_is_not_believed_holds_then_stops(fault, pinned, standing, 
     assert seen.violations == set()
 
 
-def test_a_supervisor_that_was_paused_stops_before_anything_moves(pinned, standing, tmp_path):
+@together
+def test_a_supervisor_that_was_paused_stops_before_anything_moves(root, standing):
     """What it slept through is late and silent; the checker sees that nobody was there to hold."""
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", longer(standing, 3), "good")
+    running = begun(root, root / "run", lasting(standing, 60), "good")
     wait_for(lambda: has(events(running.folder), "accept"))
     running.supervisor.send_signal(signal.SIGSTOP)
     time.sleep(1.5 * SLOW["silence_stop_s"])
@@ -175,38 +209,6 @@ def test_a_supervisor_that_was_paused_stops_before_anything_moves(pinned, standi
     assert seen.supervisor()[-1] == "silence" and seen.outcome["state"] == PROTECTIVE
     assert seen.accepted_after("silence") == 0 and seen.outcome["missed"] > 0
     assert seen.violations == {"P2.watchdog"}
-
-
-def test_a_supervisor_that_is_killed_leaves_a_journal_and_begins_stopped(
-    pinned, standing, tmp_path
-):
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", standing, "good")
-    wait_for(lambda: has(events(running.folder), "accept"))
-    running.supervisor.kill()
-    with pytest.raises(GenpolicyError, match="died with -9"):
-        running.wait(60.0)
-    assert running.policy.returncode is not None
-    left = events(running.folder)
-    assert has(left, "accept") and not has(left, "end")
-    assert violations(running.folder) == {"journal.no_end"}  # whole, but for its end
-
-    again = ended(begun(root, root / "run", standing, "good"), number=1)
-    assert again.supervisor() == ["restarted"]
-    assert (again.outcome["accepted"], again.outcome["state"]) == (0, PROTECTIVE)
-    assert again.violations == {"journal.no_end"}  # of the session before
-
-    after = ended(begun(root, root / "run", standing, "good"), number=2)
-    assert (after.supervisor(), after.outcome["accepted"]) == (["restarted"], 0)  # still stopped
-
-    cleared = begun(root, root / "run", longer(standing, 3), "good")
-    wait_for(lambda: has(events(running.folder, 3), "supervisor"))
-    cleared.say(Order.RESET, "spotter")
-    seen = ended(cleared, number=3)
-    assert seen.supervisor() == ["restarted", "human_reset"]
-    assert seen.outcome["accepted"] > 0
-    fresh = ended(begun(root, root / "run", standing, "good"), number=4)
-    assert fresh.supervisor() == []  # a person has looked
 
 
 @pytest.mark.parametrize("changed", ["limits.yaml", "fixtures.yaml"])
@@ -227,16 +229,16 @@ def test_a_byte_that_changes_after_the_start_is_refused_by_the_supervisor_itself
     root = workspace(tmp_path)
     (root / "limits.yaml").write_bytes((root / "limits.yaml").read_bytes() + b"\n")
     monkeypatch.setattr("genpolicy.wall_clock.run.read_limits", lambda root: None)
-    running = begun(root, root / "run", standing, "good")
+    running = begun(root, root / "run", standing, "good", ready=False)
     with pytest.raises(ConfigError, match=r"limits\.yaml is .* as pinned"):
         running.wait(60.0)
     assert not list((root / "run").glob("*.mcap"))
 
 
-def test_the_supervisor_loads_no_policy(pinned, standing, tmp_path):
+@together
+def test_the_supervisor_loads_no_policy(root, standing):
     """Read from the process itself, at its end."""
-    root = linked(pinned, tmp_path)
-    report = tmp_path / "modules.json"
+    report = root / "modules.json"
     wrapped = [sys.executable, str(HERE / "supervisor_that_tells_its_modules.py"), str(report)]
     seen = ended(begun(root, root / "run", standing, "good", wrapped))
     assert seen.outcome["accepted"] > 0 and seen.outcome["learned"] == []
@@ -246,18 +248,18 @@ def test_the_supervisor_loads_no_policy(pinned, standing, tmp_path):
     assert not [name for name in loaded if set(name.split(".")) & set(words)]
 
 
-def test_a_supervisor_beside_a_policy_refuses(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
+@together
+def test_a_supervisor_beside_a_policy_refuses(root, standing):
     code = "import sys, torch; from genpolicy.wall_clock.process import main; sys.exit(main())"
-    running = begun(root, root / "run", standing, "good", [sys.executable, "-c", code])
+    running = begun(root, root / "run", standing, "good", [sys.executable, "-c", code], ready=False)
     with pytest.raises(ConfigError, match="torch loaded"):
         running.wait(60.0)
     assert "torch" in LEARNED and SUPERVISOR[-1].endswith("wall_clock.process")
 
 
-def test_the_policy_holds_no_end_of_the_operators_channel(pinned, standing, tmp_path):
-    root = linked(pinned, tmp_path)
-    running = begun(root, root / "run", standing, "good")
+@together
+def test_the_policy_holds_no_end_of_the_operators_channel(root, standing):
+    running = begun(root, root / "run", standing, "good", ready=False)
     try:
         theirs = pipes(running.policy.pid)
         operator = os.fstat(running.operator._descriptor).st_ino
@@ -275,22 +277,3 @@ def pipes(pid: int) -> set[int]:
         with contextlib.suppress(FileNotFoundError):  # the folder's own, while it is read
             names.append(os.readlink(path))
     return {int(name[6:-1]) for name in names if name.startswith("pipe:")}
-
-
-def linked(pinned: Path, tmp_path: Path) -> Path:
-    """The pinned workspace; a folder of runs of its own."""
-    for name in ("limits.yaml", "fixtures.yaml"):
-        (tmp_path / name).write_bytes((pinned / name).read_bytes())
-    return tmp_path
-
-
-def longer(replay, times: int):
-    many = {name: getattr(replay, name) * times
-            for name in ("phases", "observations", "actions", "forces_n")}  # fmt: skip
-    return type(replay)(
-        episode_uuid=replay.episode_uuid, calibration_epoch=replay.calibration_epoch, **many
-    )
-
-
-def has(found, kind: str, times: int = 1) -> bool:
-    return sum(event.kind == kind for event in found) >= times
