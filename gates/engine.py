@@ -3,10 +3,7 @@
 Pure: the report is a function of the evidence, the limits and the settings.
 """
 
-import contextlib
-import importlib.metadata
 import math
-import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +11,7 @@ from typing import Any
 
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.installed import environment
 from gates.more import astride, no_decision
 from gates.overrides import NOBODY, Exceptions, aside, exceptions_of, rule, said
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
@@ -45,15 +43,6 @@ from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
 UNRECORDED = "Judged outside the pipeline: dvc.lock holds no run of"
-LIBRARIES = (
-    "numpy", "pandas", "pyarrow", "pydantic", "scipy",
-    "scikit-learn", "torch", "mujoco", "pin", "numba",
-)  # fmt: skip
-"""What judges, and what the evidence comes from: the audit, the networks, the arm, its motion."""
-REGIME = (
-    "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
-    "elsewhere samples within 1e-5 and the same verdict"
-)
 
 
 @dataclass(frozen=True)
@@ -329,14 +318,3 @@ def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list
         if name not in passed
     ]
     return passed, left_out
-
-
-def environment() -> dict[str, str]:
-    """Versions of installed libraries and the regime of the numbers: part of what is derived."""
-    found = {}
-    for name in LIBRARIES:
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            found[name] = importlib.metadata.version(name)
-    found["python"] = ".".join(platform.python_version_tuple()[:2])
-    found["regime"] = REGIME
-    return found

@@ -9,7 +9,7 @@ import numpy as np
 from gates.stress.rollouts import StressSettings
 from gates.stress.weights import by_cost
 from genpolicy.evidence.documents.stress import Power
-from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS
+from genpolicy.evidence.stress.power import POWER_CORRELATION, POWER_TRIALS
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import Array, paired_e_value, power_table, simulate_pairs
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binom
+import scipy
 
 from gates.bounds import counted_interval, draws_for_quantile
 from gates.evidence import MissingEvidenceError
@@ -29,8 +29,8 @@ from gates.verdicts import judge_criterion, rounded
 from genpolicy.evidence.documents.stress import Power
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.evidence.monitors.settings import MonitorsSettings
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
-from genpolicy.evidence.stress.tables import power_document
 
 FEWER = ("intervention_upper", "reset_upper")
 """Criteria of which a rollout is hit or not, and hits are bad: bounded from above."""
@@ -227,7 +227,7 @@ def _with_a_true_share(bound: Bound, limit: float, settings: StressSettings) -> 
     hits, ends = np.arange(starts + 1), _ends(starts, settings.confidence)
     kept = [high <= limit if fewer else low >= limit for low, high in ends]
     steps = np.arange(SHARES + 1) / SHARES
-    often = np.sum(binom.pmf(hits[kept][:, None], starts, steps), axis=0) ** conditions
+    often = np.sum(scipy.stats.binom.pmf(hits[kept][:, None], starts, steps), axis=0) ** conditions
     enough = steps[often >= TRUE_SHARE_POWER]
     worth = float(enough.max() if fewer else enough.min())
     side = "at most" if fewer else "at least"

@@ -51,9 +51,9 @@ from genpolicy.errors import ConfigError, GenpolicyError, RefusedError
 from genpolicy.evidence.documents.stress import ENVELOPE, POWER
 from genpolicy.evidence.stress.envelope import envelope_document
 from genpolicy.evidence.stress.perturbations import ReducedEnvelope
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import ENVELOPE as CONDITION
 from genpolicy.evidence.stress.settings import StressSettings
-from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.figures import expected_settings
 from genpolicy.feasibility.cell import cell_of

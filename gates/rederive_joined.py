@@ -14,7 +14,7 @@ from gates.report import Gate
 from gates.stated import refuse
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.action import ACTION_DIM
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from genpolicy.verification.drawn import Drawn
 from genpolicy.verification.rejoined import Made, Said, goes_on_from, mean_of, ways_to_plan
 

@@ -8,8 +8,6 @@ import contextlib
 from pathlib import Path
 
 from gates.overriders import require_written
-from gates.pages.page import index_page
-from gates.pages.printing import differing, printed_beside
 from gates.pages.rows import rows_folder
 from gates.pipeline import LOCK, stages_of
 from gates.proof import judge
@@ -38,6 +36,8 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
     _remove(base)
     write_index(root)
     report = judge(root, gate)
+    from gates.pages.printing import printed_beside  # noqa: PLC0415  (loads matplotlib)
+
     printed = printed_beside(root, report)
     with output_folder(root / rows_folder(gate)) as folder:
         for name in [name for name in printed if name.startswith(f"{rows_folder(gate)}/")]:
@@ -52,7 +52,7 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
 def write_index(root: Path) -> Path:
     """Write the ladder's first page from the reports that lie there."""
     path = root / INDEX
-    write_bytes(path, index_page(root).encode())
+    write_bytes(path, _index_page(root))
     return path
 
 
@@ -67,8 +67,10 @@ def changed_page(root: Path) -> str:
     Raises:
         GenpolicyError: A report or its evidence cannot be read.
     """
+    from gates.pages.printing import differing  # noqa: PLC0415  (loads matplotlib)
+
     path = root / INDEX
-    if path.is_file() and path.read_bytes() != index_page(root).encode() and _built(root):
+    if path.is_file() and path.read_bytes() != _index_page(root) and _built(root):
         return INDEX
     for gate in GATES:
         base = root / report_path(gate)
@@ -82,6 +84,12 @@ def changed_page(root: Path) -> str:
         if name := differing(root, report, recorded=recorded, whole=False):
             return name
     return ""
+
+
+def _index_page(root: Path) -> bytes:
+    from gates.pages.page import index_page  # noqa: PLC0415  (loads matplotlib)
+
+    return index_page(root).encode()
 
 
 def _built(root: Path) -> bool:

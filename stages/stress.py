@@ -13,13 +13,10 @@ from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import SEVERITIES, SeverityRow
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
-from genpolicy.evidence.stress.tables import (
-    plan_shards,
-    power_document,
-    write_stress,
-)
+from genpolicy.evidence.stress.tables import plan_shards, write_stress
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder

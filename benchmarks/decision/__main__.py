@@ -31,8 +31,8 @@ from gates.settings import Limits, read_limits, read_params, read_settings
 from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from gates.stress.weights import DURATION, LEAST_OF_A_SUCCESS
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
-from genpolicy.evidence.stress.tables import power_document
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.seeds import stream
@@ -42,7 +42,7 @@ ROOT_SEED = 13
 CODE = (
     "benchmarks/decision", "gates/stress", "gates/bounds.py", "gates/engine.py",
     "gates/verdicts.py",
-    "genpolicy/evidence/stress/tables.py", "genpolicy/seeds.py", "genpolicy/statistics",
+    "genpolicy/evidence/stress/power.py", "genpolicy/seeds.py", "genpolicy/statistics",
 )  # fmt: skip
 """What a result is of."""
 WHOLE = (

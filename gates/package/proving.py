@@ -8,7 +8,7 @@ again from its evidence.
 from dataclasses import replace
 from pathlib import Path
 
-from gates.engine import environment
+from gates.installed import environment
 from gates.package.archive import read_index, unpack
 from gates.package.bundling import (
     BUNDLED,

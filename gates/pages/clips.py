@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.pages.bound import require_bound
-from gates.pages.clips_drawn import drawn_clip
 from gates.pages.figures import Small
 from gates.pages.reasons import personal
 from gates.pipeline import TASK
@@ -21,10 +20,11 @@ from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import GenpolicyError
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.stress.worth import worth_watching
-from genpolicy.replay.bodies import DrawnCell
-from genpolicy.replay.film import Film, film_of
-from genpolicy.replay.journal_file import read_session
 from genpolicy.tasks.api import load_task
+
+if TYPE_CHECKING:
+    from genpolicy.replay.bodies import DrawnCell
+    from genpolicy.replay.film import Film
 
 MOST = 6
 MOST_SAID = 300
@@ -103,6 +103,9 @@ def _clip(evidence: Evidence, report: GateReport, row: pd.Series, why: str, numb
     session = f"{row['method']}/{row['perturbation']}/{row['start']}"
     journal = f"{STRESS}/journals/{row['method']}__{row['perturbation']}.mcap"
     require_bound(evidence, report, journal)
+    # Only where something is drawn: it loads the simulator.
+    from gates.pages.clips_drawn import drawn_clip  # noqa: PLC0415
+
     task = evidence.document(TASK, IDENTITY).name
     film = _film(evidence.root / journal, report.materials[journal], session, task)
     force = float(row["force_peak_n"])
@@ -122,12 +125,17 @@ def _clip(evidence: Evidence, report: GateReport, row: pd.Series, why: str, numb
 
 
 @lru_cache(maxsize=KEPT_FILMS)
-def _film(journal: Path, digest: str, session: str, task: str) -> Film:
+def _film(journal: Path, digest: str, session: str, task: str) -> "Film":
     """The film of a session; `digest` tells apart what lay under one name at two times."""
+    from genpolicy.replay.film import film_of  # noqa: PLC0415  (loads the simulator)
+    from genpolicy.replay.journal_file import read_session  # noqa: PLC0415
+
     found = read_session(journal, session)
     return film_of(_cell(task), [item.event for item in found.events])
 
 
 @lru_cache(maxsize=1)
-def _cell(task: str) -> DrawnCell:
+def _cell(task: str) -> "DrawnCell":
+    from genpolicy.replay.bodies import DrawnCell  # noqa: PLC0415  (loads the simulator)
+
     return DrawnCell.of(load_task(task))

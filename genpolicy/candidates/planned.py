@@ -16,7 +16,7 @@ from genpolicy.contract.planner import PLANNER, planner_sha256
 from genpolicy.errors import ConfigError, ContractError, IntegrityError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import NoiseName, Samples, check_finite
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.identity import task_identity

@@ -19,6 +19,7 @@ from torch import Tensor
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS
 from genpolicy.policies.ode_samplers import FIXED_TABLEAUS
 from genpolicy.policies.predictions import PREDICTIONS
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.samplers import CountedNetwork, NetworkFunction, refuse_name
 from genpolicy.policies.schedules import squared_cosine
 from genpolicy.policies.settings import HeadConfig, SamplerConfig
@@ -45,31 +46,16 @@ class Guidance:
     bound: float
 
 
-@dataclass(frozen=True)
-class Prefix:
-    """What each row of a batch is drawn to go on from.
-
-    Attributes:
-        actions: Given actions, physical units; of no consequence where the weight is 0.
-            Shape (B, K, D_a).
-        weights: From 0, free, to 1, as given. Shape (B, K).
-        bound: Largest factor of the guidance, > 0.
-    """
-
-    actions: Array
-    weights: Array
-    bound: float
-
-    def guidance(
-        self, rows: Sequence[int], normalise: Callable[[Array], Array], device: str
-    ) -> Guidance:
-        """Of some of the rows, in this order."""
-        rows = list(rows)
-        given = normalise(self.actions[rows]).astype(np.float32)
-        weights = self.weights[rows, :, None].astype(np.float32)
-        return Guidance(
-            torch.from_numpy(given).to(device), torch.from_numpy(weights).to(device), self.bound
-        )
+def guidance_of(
+    prefix: Prefix, rows: Sequence[int], normalise: Callable[[Array], Array], *, device: str
+) -> Guidance:
+    """The guidance of some rows of a batch, in this order."""
+    rows = list(rows)
+    given = normalise(prefix.actions[rows]).astype(np.float32)
+    weights = prefix.weights[rows, :, None].astype(np.float32)
+    return Guidance(
+        torch.from_numpy(given).to(device), torch.from_numpy(weights).to(device), prefix.bound
+    )
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from genpolicy.policies.ahead import Conditions, padded
 from genpolicy.policies.call_shapes import call_shapes, compiled_calls
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.guidance import GUIDED, Prefix
+from genpolicy.policies.guidance import GUIDED, guidance_of
 from genpolicy.policies.methods import (
     STOCHASTIC_SAMPLERS,
     check_sampler,
@@ -27,6 +27,7 @@ from genpolicy.policies.methods import (
     method_named,
     noise_shape,
 )
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import NoiseName, Samples, check_finite
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.seeds import counter_noise
@@ -193,7 +194,9 @@ class NetworkPolicy:
                     head=self.checkpoint.config.head,
                     call_rows=self._calls.fit,
                     finish=compiled.finish(size) if compiled else None,
-                    guidance=prefix.guidance(rows, normalise, self.device) if prefix else None,
+                    guidance=guidance_of(prefix, rows, normalise, device=self.device)
+                    if prefix
+                    else None,
                 )
                 chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import NonFiniteError
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 
 Array = NDArray[np.float64]
 NoiseName = tuple[str | int, ...]

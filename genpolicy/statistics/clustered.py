@@ -11,8 +11,8 @@ for the number of draws that rows of a cluster are worth.
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
@@ -124,14 +124,14 @@ def _effective_draws(values: Array, member: NDArray[np.int64], quantile: float, 
     sums = np.bincount(member, weights=below - share)
     n = len(sums)
     together = float(sums @ sums) * n / (n - 1)
-    few = stats.t.isf(tail, rows - 1) / stats.t.isf(tail, n - 1)
+    few = scipy.stats.t.isf(tail, rows - 1) / scipy.stats.t.isf(tail, n - 1)
     return min(rows, math.floor(rows * alone / together * few**2)) if together > 0.0 else rows
 
 
 def _exact_ranks(rows: int, draws: int, quantile: float, tail: float) -> tuple[int, int]:
     """Ranks, from 0, of the exact interval of so many draws; -1 or `rows` where there is none."""
-    low = int(stats.binom.ppf(tail, draws, quantile))
-    high = int(stats.binom.isf(tail, draws, quantile)) + 1
+    low = int(scipy.stats.binom.ppf(tail, draws, quantile))
+    high = int(scipy.stats.binom.isf(tail, draws, quantile)) + 1
     first = math.floor((low - 1) / draws * rows) if low >= 1 else -1
     return first, math.ceil(high / draws * rows) - 1 if high <= draws else rows
 

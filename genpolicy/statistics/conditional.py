@@ -9,8 +9,8 @@ exchangeable, and the permutation p-value is exact.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from genpolicy.errors import ContractError
 
@@ -84,7 +84,7 @@ def conditional_test(
     baseline = float(null.mean())
     point = (observed - baseline) / (1.0 - baseline) if baseline < 1.0 - 1e-9 else 0.0
     half = _standard_error(label, stratum, block)
-    half *= float(stats.t.isf((1.0 - confidence) / 2.0, max(1, n - 1)))
+    half *= float(scipy.stats.t.isf((1.0 - confidence) / 2.0, max(1, n - 1)))
     effect, low, high = (min(1.0, max(0.0, x)) for x in (point, point - half, point + half))
     return ConditionalTest(p_value, effect, low, high, n)
 

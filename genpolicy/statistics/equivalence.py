@@ -8,8 +8,8 @@ a comparison can find is stated beside it: the spread at which four of five equa
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import integrate, optimize, stats
 
 from genpolicy.errors import ContractError
 
@@ -78,7 +78,7 @@ def spread_found(limit: float, count: int, *, confidence: float, power: float = 
     def short(spread: float) -> float:
         return share_found(spread, limit, count, confidence=confidence) - power
 
-    return float(optimize.brentq(short, reach * 1e-3, reach * 10.0))
+    return float(scipy.optimize.brentq(short, reach * 1e-3, reach * 10.0))
 
 
 def share_found(spread: float, limit: float, count: int, *, confidence: float) -> float:
@@ -94,25 +94,26 @@ def share_found(spread: float, limit: float, count: int, *, confidence: float) -
         confidence: Coverage of the interval.
     """
     freedom = 2 * count - 2
-    quantile = float(stats.t.isf((1.0 - confidence) / 2.0, freedom))
+    quantile = float(scipy.stats.t.isf((1.0 - confidence) / 2.0, freedom))
     error = spread * math.sqrt(2.0 / count)
     reach = math.log(limit)
 
     def density(squares: float) -> float:
         rest = reach - quantile * error * math.sqrt(squares / freedom)
-        inside = 2.0 * stats.norm.cdf(rest / error) - 1.0
-        return float(inside * stats.chi2.pdf(squares, freedom))
+        inside = 2.0 * scipy.stats.norm.cdf(rest / error) - 1.0
+        return float(inside * scipy.stats.chi2.pdf(squares, freedom))
 
     most = min(
-        freedom * (reach / (quantile * error)) ** 2, float(stats.chi2.isf(NEGLIGIBLE, freedom))
+        freedom * (reach / (quantile * error)) ** 2,
+        float(scipy.stats.chi2.isf(NEGLIGIBLE, freedom)),
     )
-    return float(integrate.quad(density, 0.0, most, limit=200)[0])
+    return float(scipy.integrate.quad(density, 0.0, most, limit=200)[0])
 
 
 def _interval(
     middle: float, error: float, freedom: int, confidence: float
 ) -> tuple[float, float, float]:
-    reach = float(stats.t.isf((1.0 - confidence) / 2.0, freedom)) * error
+    reach = float(scipy.stats.t.isf((1.0 - confidence) / 2.0, freedom)) * error
     return math.exp(middle), math.exp(middle - reach), math.exp(middle + reach)
 
 

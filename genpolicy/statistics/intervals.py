@@ -7,8 +7,8 @@ approximation. Sources: Clopper and Pearson 1934; David and Nagaraja, Order Stat
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from genpolicy.errors import ContractError, NonFiniteError
 
@@ -29,8 +29,12 @@ def clopper_pearson(successes: int, n: int, confidence: float = 0.95) -> tuple[f
     """
     _check_counts(successes, n, confidence)
     tail = (1.0 - confidence) / 2.0
-    lower = 0.0 if successes == 0 else float(stats.beta.ppf(tail, successes, n - successes + 1))
-    upper = 1.0 if successes == n else float(stats.beta.isf(tail, successes + 1, n - successes))
+    lower = (
+        0.0 if successes == 0 else float(scipy.stats.beta.ppf(tail, successes, n - successes + 1))
+    )
+    upper = (
+        1.0 if successes == n else float(scipy.stats.beta.isf(tail, successes + 1, n - successes))
+    )
     return lower, upper
 
 
@@ -57,11 +61,11 @@ def order_statistic_interval(
     ordered, n = np.sort(values), len(values)
     tail = (1.0 - confidence) / 2.0
     # P(X_(r) > q) = P(Bin(n, q) < r) <= tail for the largest such r; mirrored above.
-    low = int(stats.binom.ppf(tail, n, quantile)) if n else 0
-    while low > 0 and stats.binom.cdf(low - 1, n, quantile) > tail:
+    low = int(scipy.stats.binom.ppf(tail, n, quantile)) if n else 0
+    while low > 0 and scipy.stats.binom.cdf(low - 1, n, quantile) > tail:
         low -= 1
-    high = int(stats.binom.isf(tail, n, quantile)) + 1 if n else 1
-    while high <= n and stats.binom.sf(high - 1, n, quantile) > tail:
+    high = int(scipy.stats.binom.isf(tail, n, quantile)) + 1 if n else 1
+    while high <= n and scipy.stats.binom.sf(high - 1, n, quantile) > tail:
         high += 1
     lower = float(ordered[low - 1]) if low >= 1 else -math.inf
     upper = float(ordered[high - 1]) if high <= n else math.inf

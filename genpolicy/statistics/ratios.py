@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from genpolicy.errors import ContractError
 
@@ -44,5 +44,5 @@ def ratio_of_sums(
     ratio = float(np.sum(numerator)) / total
     rest = np.asarray(numerator - ratio * denominator, dtype=np.float64)
     error = math.sqrt(float(rest @ rest) / (count * (count - 1))) / (total / count)
-    reach = float(stats.t.isf((1.0 - confidence) / 2.0, count - 1)) * error
+    reach = float(scipy.stats.t.isf((1.0 - confidence) / 2.0, count - 1)) * error
     return ratio, ratio - reach, ratio + reach

@@ -14,7 +14,7 @@ from genpolicy.candidates.planned import (
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.planner import PLANNER, planner_sha256
 from genpolicy.errors import ConfigError, ContractError, IntegrityError, NonFiniteError
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from genpolicy.tasks.api import WorldSettings, load_task
 from genpolicy.tasks.identity import task_identity
 

@@ -9,8 +9,9 @@ import pytest
 from asking import SPEC
 
 from gates.criterion import Measured
-from gates.engine import environment, judge, promoted_below, upstream_hashes
+from gates.engine import judge, promoted_below, upstream_hashes
 from gates.evidence import Evidence
+from gates.installed import LIBRARIES, environment
 from gates.more import ASTRIDE, INSIDE
 from gates.pipeline import TASK_IDENTITY, Basis
 from gates.report import report_bytes, report_path
@@ -156,13 +157,35 @@ def test_the_environment_names_what_the_numbers_come_from():
     assert environment()["torch"] == importlib.metadata.version("torch")
 
 
-def test_a_library_that_is_not_installed_is_left_out(monkeypatch):
-    def version(name):
+def test_versions_are_those_that_the_installer_wrote():
+    found = environment()
+    assert {name: found[name] for name in LIBRARIES} == {
+        name: importlib.metadata.version(name) for name in LIBRARIES
+    }
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        "Metadata-Version: 2.4\nName: a\nVersion: 1.0\n\nVersion: 2.0\n",
+        "Name: a\nLicense: x\n        Version: 3\nVersion:1.0\nRequires-Dist: b\n\nText",
+        "name: a\nversion: 1.0\n\nVersion: 2.0\n",
+    ],
+)
+def test_a_library_that_is_not_installed_is_left_out(monkeypatch, metadata):
+    class Installed(importlib.metadata.Distribution):
+        def read_text(self, filename):
+            return metadata if filename == "METADATA" else None
+
+        def locate_file(self, path):
+            return path
+
+    def distribution(name):
         if name == "pin":
             raise importlib.metadata.PackageNotFoundError(name)
-        return "1.0"
+        return Installed()
 
-    monkeypatch.setattr(importlib.metadata, "version", version)
+    monkeypatch.setattr(importlib.metadata, "distribution", distribution)
     assert "pin" not in environment() and environment()["torch"] == "1.0"
 
 

@@ -26,7 +26,7 @@ from gates.stress.cost import _rollouts_with
 from gates.stress.rollouts import StressSettings
 from genpolicy.cli.main import main
 from genpolicy.errors import ConfigError
-from genpolicy.evidence.stress.tables import POWER_CORRELATION
+from genpolicy.evidence.stress.power import POWER_CORRELATION
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
 

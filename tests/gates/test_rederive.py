@@ -36,8 +36,8 @@ from genpolicy.evidence.rows.stress import (
 )
 from genpolicy.evidence.shadow.tables import checked
 from genpolicy.evidence.stress.measured import Measured
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
-from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal, write_journal

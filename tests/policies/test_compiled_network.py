@@ -9,10 +9,10 @@ from genpolicy.policies.ahead import AheadNetwork, Conditions
 from genpolicy.policies.call_shapes import compiled_calls
 from genpolicy.policies.compiled_network import CompiledNetwork
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.methods import announced_times, generate, method_named, noise_shape
 from genpolicy.policies.networks import Dimensions
 from genpolicy.policies.policy import load_policy
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 # A few more outputs than a library's smallest product has a kernel of its own for, a layer that is

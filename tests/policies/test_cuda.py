@@ -17,10 +17,10 @@ from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.density import log_density
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
 from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.training import train
 

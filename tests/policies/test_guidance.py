@@ -8,10 +8,11 @@ import torch
 
 from genpolicy.errors import ConfigError, EvaluationCapError
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
-from genpolicy.policies.guidance import GUIDED, Guidance, GuidedNetwork, Prefix, path_of
+from genpolicy.policies.guidance import GUIDED, Guidance, GuidedNetwork, path_of
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.ode_samplers import FIXED_TABLEAUS, sample_ode
 from genpolicy.policies.policy import load_policy
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.samplers import CountedNetwork
 from genpolicy.policies.schedules import squared_cosine
 from genpolicy.policies.settings import HeadConfig, SamplerConfig

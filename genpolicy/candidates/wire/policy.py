@@ -28,7 +28,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import Term
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import NoiseName, Samples
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ import itertools
 import math
 import time
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,11 @@ from genpolicy.candidates.wire.extension import MOST_CANDIDATES, VERSION, WORD
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ContractError
-from genpolicy.policies.guidance import Prefix
-from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import NoiseName
+
+if TYPE_CHECKING:
+    from genpolicy.policies.policy import NetworkPolicy
 
 OBSERVATION = "observation"
 ACTIONS = "actions"
@@ -36,7 +38,7 @@ class ServedPolicy:
     """
 
     def __init__(
-        self, policy: NetworkPolicy, *, samplers: Mapping[str, NetworkPolicy] | None = None
+        self, policy: "NetworkPolicy", *, samplers: "Mapping[str, NetworkPolicy] | None" = None
     ) -> None:
         self._policy, self._samplers = policy, dict(samplers or {})
         self._unnamed = itertools.count()
@@ -98,7 +100,7 @@ class ServedPolicy:
             },
         }
 
-    def _chosen(self, name: Any) -> NetworkPolicy:
+    def _chosen(self, name: Any) -> "NetworkPolicy":
         """The policy under the sampler that a message asks for."""
         if name is None:
             return self._policy

@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from genpolicy.contract.settings import Settings
-from genpolicy.monitors.names import CONTROLS
-from genpolicy.monitors.registry import MONITORS
+from genpolicy.monitors.names import CONTROLS, KINDS
 
 WHERE = "params.yaml: monitors"
 SEPARATOR = "@"
@@ -60,9 +59,8 @@ class MonitorsSettings(Settings):
     @classmethod
     def _known(cls, names: list[str]) -> list[str]:
         for name in names:
-            if name not in MONITORS or name in CONTROLS:
-                known = [kind for kind in MONITORS if kind not in CONTROLS]
-                raise ValueError(f"{name!r} is no monitor; there are {', '.join(known)}")
+            if name not in KINDS:
+                raise ValueError(f"{name!r} is no monitor; there are {', '.join(KINDS)}")
         return names
 
     @model_validator(mode="after")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from genpolicy.evidence.rows.need import EffectRow, FactorErrorRow, FactorModeRow
 
@@ -97,7 +97,7 @@ def half_width(gains: Array, confidence: float) -> float:
     """Half of the t interval of a mean, which covers it with `confidence`; NaN below two values."""
     if len(gains) < SEVERAL:
         return math.nan
-    quantile = float(stats.t.isf((1.0 - confidence) / 2.0, len(gains) - 1))
+    quantile = float(scipy.stats.t.isf((1.0 - confidence) / 2.0, len(gains) - 1))
     return quantile * float(gains.std(ddof=1)) / math.sqrt(len(gains))
 
 

@@ -24,8 +24,8 @@ from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
 from genpolicy.evidence.reproducibility.processor import RunQueue, run_queue, waited_s
-from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import Policy
 from genpolicy.policies.settings import SamplerConfig
 

@@ -31,7 +31,7 @@ from genpolicy.evidence.stress.shard_rows import (
 )
 from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.journal import write_journal
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Start, Task, load_task

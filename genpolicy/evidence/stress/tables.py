@@ -14,7 +14,7 @@ from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
-from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE, Power
+from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE
 from genpolicy.evidence.rows.brought import FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
@@ -34,18 +34,13 @@ from genpolicy.evidence.stress.envelope import envelope_document, require_tighte
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
-from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison, Shard, ShardResult
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.rows import write_rows
-from genpolicy.seeds import stream
-from genpolicy.statistics.eprocess import power_table
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.commands import reach_of
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
-POWER_CORRELATION = 0.3
-POWER_TRIALS = 4000
 
 
 def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, scheduler: str) -> None:
@@ -202,38 +197,6 @@ def plan_shards(
         )
         for (name, schedule), policy in product(perturbations.items(), judged)
     ]
-
-
-def power_document(settings: StressSettings, *, candidates: int, root_seed: int) -> Power:
-    """Which verdicts the pre-registered test can reach; content of `power.json`.
-
-    Args:
-        settings: Section `stress`.
-        candidates: How many were pre-registered; alpha is shared between them.
-        root_seed: Root seed.
-    """
-    alpha = settings.alpha_of_each(candidates)
-    rows = power_table(
-        power_worlds(settings),
-        margin=settings.margin,
-        alpha=alpha,
-        pairs=settings.starts,
-        correlation=POWER_CORRELATION,
-        trials=POWER_TRIALS,
-        rng=stream(root_seed, "stress", "power"),
-    )
-    return Power(margin=settings.margin, alpha=alpha, pairs=settings.starts, rows=rows)
-
-
-def power_worlds(settings: StressSettings) -> list[tuple[float, float]]:
-    """Worlds of the power table, baseline and candidate: no gain, just the margin, and more.
-
-    A start is one draw, as if all its conditions ended alike: the world with most noise.
-    """
-    baseline, margin = settings.planned_effect[0], settings.margin
-    lowest = min(max(baseline, -margin), 1.0 - margin)  # so that both are shares
-    worlds = [(baseline, baseline), (0.9, 0.9), (lowest, lowest + margin), settings.planned_effect]
-    return list(dict.fromkeys([*worlds, (0.3, 0.9), (0.1, 0.9)]))
 
 
 def _key(shard: Shard) -> dict[str, str]:

@@ -14,7 +14,7 @@ from genpolicy.candidates.wire.policy import GONE_AFTER, WirePolicy, running
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ConfigError, IntegrityError
-from genpolicy.policies.guidance import Prefix
+from genpolicy.policies.prefix import Prefix
 from tests.candidates.conftest import ENTRY
 from tests.candidates.wire.test_remote import CAN, Planted
 

@@ -9,8 +9,8 @@ from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.contract.action import join_action, split_action
 from genpolicy.errors import ContractError
-from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import load_policy
+from genpolicy.policies.prefix import Prefix
 
 
 @pytest.fixture

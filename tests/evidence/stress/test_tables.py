@@ -23,15 +23,10 @@ from genpolicy.evidence.stress.latency import (
 )
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
+from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import PersonSettings, StressSettings
 from genpolicy.evidence.stress.shard import Comparison
-from genpolicy.evidence.stress.tables import (
-    AGE_LEVELS,
-    plan_shards,
-    power_document,
-    write_distilled,
-    write_stress,
-)
+from genpolicy.evidence.stress.tables import AGE_LEVELS, plan_shards, write_distilled, write_stress
 from genpolicy.execution.cell import Cell
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table

@@ -9,7 +9,7 @@ from editing import cells
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.stress.trial import unmatched_starts, verdict_reachable
-from genpolicy.evidence.stress.tables import POWER_TRIALS
+from genpolicy.evidence.stress.power import POWER_TRIALS
 
 
 def _of(method):
