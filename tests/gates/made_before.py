@@ -11,6 +11,7 @@ constant, it is made. `FRESH=1` makes everything always.
 import os
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
+from types import ModuleType
 from typing import Any, TypeVar
 
 import pytest
@@ -27,8 +28,12 @@ Made = TypeVar("Made")
 MISSING = ""
 TRAINED = "/seed_"
 """In the names of files that some criteria find by pattern and do not name."""
-BESIDE = ("gates.rederive.rederive", "gates.printed.", "gates.report.")
-"""Whatever stands in the place of these, no criterion and no figure calls it."""
+BESIDE = (
+    "gates.rederive.rederive", "gates.printed.", "gates.report.", "stages.",
+    "genpolicy.candidates.judged.",
+)  # fmt: skip
+"""Whatever stands in the place of these, no criterion and no figure calls it, nor do they read the
+environment."""
 PICTURED = (Plot, Series, Listing)
 _answer = engine._answer
 _picture: dict[type, Callable[..., dict[str, Any]]] = {kind: kind.picture for kind in PICTURED}
@@ -56,7 +61,8 @@ def nothing_made_twice() -> Iterator[None]:
 
 def _noting(change: Callable[..., None]) -> Callable[..., None]:
     def noted(self: pytest.MonkeyPatch, target: Any, *others: Any, **named: Any) -> None:
-        if not (isinstance(target, str) and target.startswith(BESIDE)):
+        place = f"{target.__name__}." if isinstance(target, ModuleType) else str(target)
+        if not (target is os.environ or place.startswith(BESIDE)):
             _replaced.append(target)
         change(self, target, *others, **named)
 

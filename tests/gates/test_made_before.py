@@ -14,6 +14,7 @@ from gates.proof import judge
 from gates.report import report_bytes
 from gates.settings import read_params
 from gates.stress import gate as stress
+from genpolicy.candidates import judged
 
 
 @pytest.fixture
@@ -131,6 +132,7 @@ def test_in_the_place_of_a_function_another_one_answers(ladder, monkeypatch):
 
 def test_a_function_that_no_criterion_calls_is_none(ladder, monkeypatch):
     monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: None)
+    monkeypatch.setattr(judged, "load_policy", lambda folder: None)
     assert not made_before._replaced
     monkeypatch.setitem(evidence.PARAMS, "none", None)
     assert made_before._replaced
