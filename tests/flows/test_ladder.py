@@ -10,6 +10,12 @@ from flows.workspace import make_workspace
 from genpolicy.errors import ConfigError
 
 
+@pytest.fixture(scope="session")
+def prefect_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of all flows here, one behind the other: its database is made once, which takes longest."""
+    return tmp_path_factory.mktemp("prefect")
+
+
 def test_stages_are_cut_behind_every_gate() -> None:
     names = ("record", "audit", "gate_a", "shadow", "gate_b")
     plan = ladder.stages_by_gate({"stages": dict.fromkeys(names)})
@@ -19,20 +25,20 @@ def test_stages_are_cut_behind_every_gate() -> None:
 
 
 def test_an_unreachable_server_ends_the_flow_and_runs_nothing(
-    checkout: Path, tmp_path: Path
+    checkout: Path, tmp_path: Path, prefect_home: Path
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {})
-    done = _run(target, tmp_path, PREFECT_API_URL="http://127.0.0.1:9/api")
+    done = _run(target, prefect_home, PREFECT_API_URL="http://127.0.0.1:9/api")
     assert done.returncode == 1
     assert "where no server answers" in done.stderr
     assert not (target / "build").exists()
 
 
 def test_a_refusal_travels_through_prefect_as_code_and_sentence(
-    checkout: Path, tmp_path: Path
+    checkout: Path, tmp_path: Path, prefect_home: Path
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {"generators": {"code": 3}})
-    done = _run(target, tmp_path)
+    done = _run(target, prefect_home)
     assert done.returncode == 3, done.stderr
     last = [line for line in done.stderr.splitlines() if line.startswith("The ladder stopped")]
     assert last[0].startswith("The ladder stopped: generators: Gate A refuses: share is 0.1")
@@ -43,10 +49,10 @@ def test_a_refusal_travels_through_prefect_as_code_and_sentence(
 
 @pytest.mark.parametrize("verdict", ["FAIL", "INCONCLUSIVE"])
 def test_a_gate_that_does_not_pass_is_a_failed_task_and_flow(
-    checkout: Path, tmp_path: Path, verdict: str
+    checkout: Path, tmp_path: Path, prefect_home: Path, verdict: str
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {"gate_a": {"verdict": verdict}})
-    done = _run(target, tmp_path)
+    done = _run(target, prefect_home)
     said = done.stdout + done.stderr
     assert done.returncode == 3, done.stderr
     assert f"The ladder stopped: gate_a: {verdict}. Return to the dataset." in done.stderr
@@ -56,19 +62,19 @@ def test_a_gate_that_does_not_pass_is_a_failed_task_and_flow(
 
 
 def test_a_gate_that_waits_for_people_is_complete_under_that_name(
-    checkout: Path, tmp_path: Path
+    checkout: Path, tmp_path: Path, prefect_home: Path
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {"gate_b": {"verdict": "PENDING_REVIEW"}})
-    done = _run(target, tmp_path)
+    done = _run(target, prefect_home)
     assert done.returncode == 0, done.stderr
     assert "PENDING_REVIEW(" in done.stdout + done.stderr
 
 
 def test_a_gate_e_that_waits_is_suspended_behind_a_ladder_that_is_done(
-    waiting_checkout: Path, tmp_path: Path
+    waiting_checkout: Path, tmp_path: Path, prefect_home: Path
 ) -> None:
     target = make_workspace(waiting_checkout, tmp_path / "run", {})
-    done = _run(target, tmp_path)
+    done = _run(target, prefect_home)
     said = done.stdout + done.stderr
     assert done.returncode == 0, done.stderr
     assert "Finished in state Suspended(" in said and "genpolicy resume" in done.stdout
@@ -76,10 +82,10 @@ def test_a_gate_e_that_waits_is_suspended_behind_a_ladder_that_is_done(
 
 
 def test_a_gate_e_below_which_a_gate_does_not_pass_is_not_begun(
-    waiting_checkout: Path, tmp_path: Path
+    waiting_checkout: Path, tmp_path: Path, prefect_home: Path
 ) -> None:
     target = make_workspace(waiting_checkout, tmp_path / "run", {"gate_a": {"verdict": "FAIL"}})
-    done = _run(target, tmp_path)
+    done = _run(target, prefect_home)
     assert done.returncode == 3, done.stderr
     assert "gate-e" not in done.stdout + done.stderr
 
@@ -88,7 +94,7 @@ def _run(workspace: Path, home: Path, **variables: str) -> "subprocess.Completed
     environment = {key: value for key, value in os.environ.items() if "PREFECT" not in key}
     return subprocess.run(
         [sys.executable, "-m", "flows.ladder", "--workspace", str(workspace)],
-        env={**environment, "PREFECT_HOME": str(home / "prefect"), **variables},
+        env={**environment, "PREFECT_HOME": str(home), **variables},
         capture_output=True,
         text=True,
         check=False,
