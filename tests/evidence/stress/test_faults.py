@@ -13,7 +13,6 @@ from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
-from genpolicy.feasibility.reasons import Reason
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.owed import Times, stated_otherwise
 from genpolicy.verification.rollouts import derived_with_recoveries
@@ -66,8 +65,9 @@ def test_it_is_a_missed_deadline_with_its_kind_beside_it(play, kit, tmp_path):
     tally = rollout.tally
     assert tally.faults == Counter(late=2, shape=1)
     assert tally.deadline_misses == 3
-    # What goes on behind a gap approaches at the edge of what is allowed, where processors differ.
-    assert set(tally.rejected_by) <= {Reason.APPROACH_DIRECTION}
+    # As without a fault: on some processors this plan is refused once, whatever fails.
+    plain = play({}).tally
+    assert (tally.rejections, tally.rejected_by) == (plain.rejections, plain.rejected_by)
     told = invocations(rollout)
     failed = [n for n, event in enumerate(told) if event.payload["stage"] == "fault"]
     assert [told[n].payload["detail"] for n in failed] == ["late", "shape", "late"]
