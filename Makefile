@@ -41,6 +41,8 @@ export PREFECT_SERVER_ANALYTICS_ENABLED := false
 export PREFECT_HOME := $(CURDIR)/.prefect
 export OMP_NUM_THREADS := 1
 export PYTHONHASHSEED := 0
+# Containers like to switch it on; each of many processes would then compile all sources again.
+export PYTHONDONTWRITEBYTECODE :=
 # With wider registers torch's sums depend on where a tensor lies in memory (decision 92).
 export ATEN_CPU_CAPABILITY := avx2
 export MPLBACKEND := Agg

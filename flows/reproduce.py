@@ -28,6 +28,7 @@ EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
 KEPT_LINES = 400
 FIRST_PAGE = "reports/index.html"
 GRACE_S = 5.0
+QUICK_DVC = Path(__file__).with_name("quick_dvc.py")
 
 FAILED_STAGE = re.compile(
     r"failed to reproduce '(?P<stage>[^']+)': failed to run: .*exited with (?P<code>-?\d+)"
@@ -90,7 +91,7 @@ def reproduce(
     Raises:
         BadInputError: All ran, and the last gate left no report, or one without verdict.
     """
-    command = [sys.executable, "-m", "dvc", "repro", *stages]
+    command = [sys.executable, "-P", str(QUICK_DVC), "repro", *stages]
     command += ["--single-item"] if single_item else []
     command += ["--force"] if force else []
     started = time.monotonic()

@@ -12,9 +12,12 @@ from gates.pages.figures import Plot
 from gates.pages.printing import printed_beside
 from gates.proof import judge
 from gates.report import report_bytes
+from gates.reproducibility import timing
 from gates.settings import read_params
 from gates.stress import gate as stress
 from genpolicy.candidates import judged
+
+KNOWN = 1.0
 
 
 @pytest.fixture
@@ -34,7 +37,7 @@ def _made(monkeypatch):
     monkeypatch.setattr(made_before, "_answer", noted)
     monkeypatch.setitem(made_before._picture, Plot, drawn)
     monkeypatch.setattr(made_before, "_known", {})
-    made_before._replaced.clear()
+    made_before.forget()
     return made
 
 
@@ -136,3 +139,50 @@ def test_a_function_that_no_criterion_calls_is_none(ladder, monkeypatch):
     assert not made_before._replaced
     monkeypatch.setitem(evidence.PARAMS, "none", None)
     assert made_before._replaced
+
+
+def _believe(patch):
+    patch.setattr(timing, "require_as_timed", lambda *_, **__: None)
+
+
+def test_what_always_answers_the_same_in_a_place_makes_a_question_of_its_own(
+    ladder, _made, monkeypatch
+):
+    """Asked without it, with it, behind it, with it once more: each time as if freshly made."""
+
+    def judged_again():
+        _made.clear()
+        report = judge(ladder, "B")
+        made = len(_made)
+        assert report_bytes(report) == report_bytes(_fresh(ladder, "B"))
+        made_before._replaced.clear()  # what `_fresh` put in a place
+        return report, made
+
+    evidence.edit_table(
+        ladder, "latency/model.parquet", lambda rows: rows.assign(measured_s=9.0, drawn_s=1.0)
+    )
+    plain, _ = judged_again()
+    with monkeypatch.context() as patch:
+        _believe(patch)
+        assert not made_before._replaced
+        believed, made = judged_again()
+        assert believed != plain and made > 10
+        patch.undo()
+        assert judged_again()[0] == plain
+    with monkeypatch.context() as patch:
+        made_before.forget()
+        _believe(patch)
+        assert judged_again() == (believed, 0)
+
+
+def _kept(answer):
+    return lambda *_: answer
+
+
+@pytest.mark.parametrize(
+    "function", [lambda *_: KNOWN, lambda *_, at=1.0: at, _kept(1.0), len, None]
+)
+def test_what_may_answer_otherwise_another_time_is_told_apart_by_nothing(monkeypatch, function):
+    assert made_before._code_of_fixed(function) is None
+    monkeypatch.setattr(timing, "require_as_timed", function)
+    assert made_before._replaced and not made_before._fixed

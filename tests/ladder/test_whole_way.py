@@ -45,6 +45,7 @@ def test_ibc_plain_bc_and_a_policy_of_somebody_else_as_candidates(copy: Path) ->
     bring_flow(copy)
 
     def add(params: dict[str, Any]) -> None:
+        params["compute"]["workers"] = 1  # the finished ladder had two
         params["train_generators"]["samplers"] = ADDED  # the others' way: the finished ladder
         params["stress"]["starts"] = 1
         params["card"]["failure_search"]["evaluations"] = 1

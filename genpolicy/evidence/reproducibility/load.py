@@ -1,16 +1,17 @@
 """Latency against the number of candidates, on a quiet machine and beside a competing load."""
 
-import multiprocessing
 import os
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from multiprocessing.synchronize import Event, Semaphore
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
 from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.evidence.reproducibility import burning
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
@@ -22,8 +23,6 @@ COUNTS = (1, 4, 8, 32)
 REPEATS = 20
 DISCARDED = 3
 QUIET, BUSY = "none", "every core"
-SIDE = 256
-START_S = 60.0
 
 
 def candidates_rows(plan: LatencyPlan, policies: Sequence[Contender]) -> list[CandidatesRow]:
@@ -58,29 +57,28 @@ def measure_counts(plan: LatencyPlan, judged: Contender) -> list[CandidatesRow]:
 
 
 @contextmanager
-def competing() -> Iterator[int]:
-    """A process on every core that multiplies matrices inside the block; yields how many."""
-    context = multiprocessing.get_context("spawn")
-    stop, ready = context.Event(), context.Semaphore(0)
-    count = len(os.sched_getaffinity(0))
-    burners = [context.Process(target=_burn, args=(stop, ready)) for _ in range(count)]
-    try:
-        for burner in burners:
-            burner.start()
-        for _ in burners:
-            ready.acquire(timeout=START_S)
-        yield count
-    finally:
-        stop.set()
-        for burner in burners:
-            burner.join()
+def competing() -> Iterator[list["subprocess.Popen[bytes]"]]:
+    """A process on every core that multiplies matrices inside the block; yields them.
+
+    Raises:
+        RuntimeError: One of them ended before it had begun.
+    """
+    with ExitStack() as burners:
+        started = [burners.enter_context(_burner()) for _ in os.sched_getaffinity(0)]
+        for burner in started:
+            assert burner.stdout is not None
+            if burner.stdout.readline() != burning.READY:
+                raise RuntimeError("a competing process ended before it had begun")
+        yield started
 
 
-def _burn(stop: Event, ready: Semaphore) -> None:
-    matrix = np.full((SIDE, SIDE), 1.0 / SIDE)
-    ready.release()
-    while not stop.is_set():
-        matrix = matrix @ matrix
+@contextmanager
+def _burner() -> Iterator["subprocess.Popen[bytes]"]:
+    """Popen waits for it at the end of the block, with its input closed."""
+    with subprocess.Popen(
+        [sys.executable, burning.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as burner:
+        yield burner
 
 
 def _measured(

@@ -1,6 +1,8 @@
 """Candidates against time, alone and beside a load: every combination, and a load that ends."""
 
-import multiprocessing
+import os
+import time
+from pathlib import Path
 
 import pytest
 
@@ -30,13 +32,30 @@ def test_each_count_is_timed_alone_and_beside_a_load(few, fleet, dataset, kit):
 
 
 def test_the_load_runs_inside_the_block_and_ends_with_it():
-    with load.competing() as count:
-        burning = multiprocessing.active_children()
-        assert len(burning) == count > 0 and all(burner.is_alive() for burner in burning)
-    assert multiprocessing.active_children() == []
+    with load.competing() as burners:
+        assert len(burners) == len(os.sched_getaffinity(0))
+        before = [_seconds_of(burner) for burner in burners]
+        time.sleep(1.0)
+        after = [_seconds_of(burner) for burner in burners]
+        assert all(late > early for early, late in zip(before, after, strict=True))
+    assert [burner.returncode for burner in burners] == [0] * len(burners)
 
 
 def test_the_load_ends_with_an_error_as_well():
-    with pytest.raises(KeyError), load.competing():
+    with pytest.raises(KeyError), load.competing() as burners:
         raise KeyError
-    assert multiprocessing.active_children() == []
+    assert all(burner.returncode == 0 for burner in burners)
+
+
+def test_a_load_that_does_not_begin_is_none(monkeypatch, tmp_path):
+    broken = tmp_path / "broken.py"
+    broken.write_text("raise SystemExit(3)")
+    monkeypatch.setattr(load.burning, "__file__", str(broken))
+    with pytest.raises(RuntimeError, match="before it had begun"), load.competing():
+        pass
+
+
+def _seconds_of(process):
+    """Of the processor, in the user's mode; field 14 of proc(5)."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[11])
