@@ -12,6 +12,7 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 from genpolicy.contract.action import join_action
 from genpolicy.errors import ContractError
 from genpolicy.tasks.tabletop_insertion import scene
+from genpolicy.tasks.tabletop_insertion.phases import INSERT_LEAVE_HEIGHT_M
 from genpolicy.tasks.tabletop_insertion.plans import ACTION_PERIOD_S
 
 Array = NDArray[np.float64]
@@ -23,6 +24,9 @@ KINDS = (RETREAT, CLASSICAL_RETURN)
 SPEED_M_S = 0.15
 ACCELERATION_M_S2 = 0.6
 JERK_M_S3 = 6.0
+# While the tip may be in the hole or close above it: what is held goes up by less than 3 mm a
+# period there, which is what the contact layer allows of any action.
+LIFT_SPEED_M_S = 0.05
 YAW_SPEED_RAD_S = 0.5
 YAW_ACCELERATION_RAD_S2 = 2.0
 YAW_JERK_RAD_S3 = 20.0
@@ -45,8 +49,9 @@ def plan(
     """Actions of a fallback from a TCP at rest.
 
     Args:
-        kind: `retreat` (straight up to a safe height) or `classical_return` (then around the
-            post, on the side where the hand is, to the start region).
+        kind: `retreat` (straight up to a safe height, slowly from where the phase may be one of
+            contact) or `classical_return` (then around the post, on the side where the hand is, to
+            the start region).
         tcp_m: Commanded TCP position, m. Shape (3,).
         yaw_rad: Commanded yaw of the downward-pointing tool.
         gripper_opening_m: Kept as it is.
@@ -69,7 +74,12 @@ def plan(
     points += [np.array([*corner, yaw_rad]) for corner in _corners(kind, tcp_m, post_y_m)]
     if kind == CLASSICAL_RETURN:
         points[-1][3] = 0.0
-    parts = [_segment(begin, end) for begin, end in pairwise(points)]
+    low = float(tcp_m[2]) - scene.TIP_OFFSET_M - scene.FIXTURE_TOP_M < INSERT_LEAVE_HEIGHT_M
+    speeds = [LIFT_SPEED_M_S if low else SPEED_M_S] + [SPEED_M_S] * (len(points) - 2)
+    parts = [
+        _segment(begin, end, speed)
+        for (begin, end), speed in zip(pairwise(points), speeds, strict=True)
+    ]
     path = np.concatenate(parts)
     rotations = np.stack([scene.tool_rotation(yaw) for yaw in path[:, 3]])
     return join_action(path[:, :3], rotations, gripper_opening_m)
@@ -93,13 +103,13 @@ def _corners(kind: str, tcp_m: Array, post_y_m: float) -> list[Array]:
     return corners
 
 
-def _segment(begin: Array, end: Array) -> Array:
+def _segment(begin: Array, end: Array, speed_m_s: float) -> Array:
     if np.abs(end - begin).max() < 1e-9:
         return end[None].copy()
     request = InputParameter(4)
     request.current_position = begin.tolist()
     request.target_position = end.tolist()
-    request.max_velocity = [SPEED_M_S] * 3 + [YAW_SPEED_RAD_S]
+    request.max_velocity = [speed_m_s] * 3 + [YAW_SPEED_RAD_S]
     request.max_acceleration = [ACCELERATION_M_S2] * 3 + [YAW_ACCELERATION_RAD_S2]
     request.max_jerk = [JERK_M_S3] * 3 + [YAW_JERK_RAD_S3]
     trajectory = Trajectory(4)

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from genpolicy.errors import ContractError
+from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.tasks.tabletop_insertion import fallback
+from genpolicy.tasks.tabletop_insertion.phases import INSERT_LEAVE_HEIGHT_M as LEAVES_M
+from genpolicy.tasks.tabletop_insertion.scene import FIXTURE_TOP_M, TIP_OFFSET_M
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart
 from genpolicy.tasks.tabletop_insertion.task import TASK
 
@@ -53,6 +56,24 @@ def test_plans_keep_speed_and_jerk():
     # Segments end between two actions, so a difference may span the end of one and the next begin.
     assert np.abs(jerk).max() <= 4 * fallback.JERK_M_S3
     assert (plan[:, 9] == 0.04).all()
+
+
+@pytest.mark.parametrize("kind", fallback.KINDS)
+@pytest.mark.parametrize("low", np.arange(0.08, 0.16, 0.01))
+def test_what_is_held_is_lifted_as_contact_allows(kind, low):
+    """Wherever the phase may be `insert`: no step goes further up than the contact layer forgives.
+
+    Nor sideways: the hand is straight above until the phase can have ended.
+    """
+    begin = np.array([0.65, 0.0, low])
+    plan = fallback.plan(
+        kind, tcp_m=begin, yaw_rad=0.2, gripper_opening_m=0.01, post_y_m=0.0
+    )  # fmt: skip
+    path = np.vstack([begin, plan[:, :3]])
+    left = int(np.argmax(path[:, 2] - TIP_OFFSET_M - FIXTURE_TOP_M > LEAVES_M))
+    steps = np.diff(path, axis=0)[:left]
+    assert left > 0 and steps[:, 2].max() <= FeasibilitySettings().step_tolerance_m
+    assert np.abs(steps[:, :2]).max() == 0.0
 
 
 def test_an_unknown_kind_is_refused():
