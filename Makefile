@@ -4,7 +4,8 @@
 #   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
 #   make test     format, lint, types, import contracts, tests
 #   make soak     twenty million random events against executor, stub and supervisor, ten thousand
-#                 random chunks at every millisecond (an hour and a half; it goes on where it was cut)
+#                 random chunks at every millisecond (an hour and a half; it goes on where it was
+#                 cut), and a small ladder with an energy as a candidate
 #   make lint     make test without the tests
 #   make lerobot  LeRobot's own environment in build/lerobot, to train and serve its policies
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
@@ -57,7 +58,7 @@ WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1
 .PHONY: help env ladder smoke test soak lerobot lint doctor clean
 
 help:
-	@sed -n '1,23p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,24p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
@@ -97,6 +98,7 @@ lerobot:
 soak: env
 	@python -m benchmarks.soak chunks --wanted 10000 --seed $(SEED)
 	@python -m benchmarks.soak events --wanted 20000000 --seed $(SEED)
+	@LONG=1 python -m pytest -q tests/ladder/test_whole_way.py
 
 lint: env
 	@code=0; ruff check . || code=1; ruff format --check . || code=1; \

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from flows import ladder
+from flows.server import api_url
 from flows.workspace import make_workspace
 from genpolicy.errors import ConfigError
 
@@ -14,6 +15,12 @@ from genpolicy.errors import ConfigError
 def prefect_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of all flows here, one behind the other: its database is made once, which takes longest."""
     return tmp_path_factory.mktemp("prefect")
+
+
+@pytest.fixture
+def at_server(server: None) -> dict[str, str]:
+    """The one server of this file, which takes longer to start than what is asked of it."""
+    return {"PREFECT_API_URL": api_url()}
 
 
 def test_stages_are_cut_behind_every_gate() -> None:
@@ -49,10 +56,10 @@ def test_a_refusal_travels_through_prefect_as_code_and_sentence(
 
 @pytest.mark.parametrize("verdict", ["FAIL", "INCONCLUSIVE"])
 def test_a_gate_that_does_not_pass_is_a_failed_task_and_flow(
-    checkout: Path, tmp_path: Path, prefect_home: Path, verdict: str
+    checkout: Path, tmp_path: Path, prefect_home: Path, at_server: dict[str, str], verdict: str
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {"gate_a": {"verdict": verdict}})
-    done = _run(target, prefect_home)
+    done = _run(target, prefect_home, **at_server)
     said = done.stdout + done.stderr
     assert done.returncode == 3, done.stderr
     assert f"The ladder stopped: gate_a: {verdict}. Return to the dataset." in done.stderr
@@ -62,19 +69,19 @@ def test_a_gate_that_does_not_pass_is_a_failed_task_and_flow(
 
 
 def test_a_gate_that_waits_for_people_is_complete_under_that_name(
-    checkout: Path, tmp_path: Path, prefect_home: Path
+    checkout: Path, tmp_path: Path, prefect_home: Path, at_server: dict[str, str]
 ) -> None:
     target = make_workspace(checkout, tmp_path / "run", {"gate_b": {"verdict": "PENDING_REVIEW"}})
-    done = _run(target, prefect_home)
+    done = _run(target, prefect_home, **at_server)
     assert done.returncode == 0, done.stderr
     assert "PENDING_REVIEW(" in done.stdout + done.stderr
 
 
 def test_a_gate_e_that_waits_is_suspended_behind_a_ladder_that_is_done(
-    waiting_checkout: Path, tmp_path: Path, prefect_home: Path
+    waiting_checkout: Path, tmp_path: Path, prefect_home: Path, at_server: dict[str, str]
 ) -> None:
     target = make_workspace(waiting_checkout, tmp_path / "run", {})
-    done = _run(target, prefect_home)
+    done = _run(target, prefect_home, **at_server)
     said = done.stdout + done.stderr
     assert done.returncode == 0, done.stderr
     assert "Finished in state Suspended(" in said and "genpolicy resume" in done.stdout
@@ -82,10 +89,10 @@ def test_a_gate_e_that_waits_is_suspended_behind_a_ladder_that_is_done(
 
 
 def test_a_gate_e_below_which_a_gate_does_not_pass_is_not_begun(
-    waiting_checkout: Path, tmp_path: Path, prefect_home: Path
+    waiting_checkout: Path, tmp_path: Path, prefect_home: Path, at_server: dict[str, str]
 ) -> None:
     target = make_workspace(waiting_checkout, tmp_path / "run", {"gate_a": {"verdict": "FAIL"}})
-    done = _run(target, prefect_home)
+    done = _run(target, prefect_home, **at_server)
     assert done.returncode == 3, done.stderr
     assert "gate-e" not in done.stdout + done.stderr
 
