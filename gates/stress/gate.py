@@ -20,6 +20,7 @@ from gates.stress.contact import contact_said
 from gates.stress.gains import by_condition, in_success, inside_envelope, least_gain
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
+from gates.stress.planned import planner_said
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
 from gates.stress.utility import mean_worth
 from gates.stress.visited import visited_said
@@ -92,8 +93,8 @@ def _decide(judged: Judged) -> Decision:
 
 
 def _said(judged: Judged) -> list[str]:
-    """What was never touched or visited, how clocks compare, and what monitors would have said."""
-    beside = (contact_said, visited_said, clocks_said, monitors_said)
+    """Of the planner, of what was never touched or visited, of clocks, and of monitors."""
+    beside = (planner_said, contact_said, visited_said, clocks_said, monitors_said)
     return [text for of in beside for text in of(judged)]
 
 

@@ -1,5 +1,7 @@
 """Gate D: the least evidence over the baselines, and the best of them."""
 
+from types import SimpleNamespace
+
 import evidence
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
 from gates.stress.gate import best_baseline, promotion_e_value
 from gates.stress.pairs import paired_differences
+from gates.stress.planned import planner_said
 from gates.stress.rollouts import REFUSED, UNPLANNED
 from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import RefusedRow
@@ -71,12 +74,16 @@ def test_what_layers_refused_is_bound(ladder):
     assert judge(ladder, "D").materials[REFUSED] == sha256_file(table)
 
 
-def _with_planner(root):
-    """It succeeds on every start, which no candidate does; of the others nothing changes."""
+def _with_planner(root, every=1):
+    """It succeeds on one of so many starts; of the others, of which none always does, nothing
+    changes.
+    """
     evidence.write_params(root, lambda p: p["stress"]["baselines"].append(PLANNER))
 
     def beside(frame):
-        own = frame[frame["method"] == "bc"].assign(method=PLANNER, success=True, outcome="success")
+        own = frame[frame["method"] == "bc"].assign(method=PLANNER)
+        own["success"] = own["start"] % every == 0
+        own["outcome"] = own["success"].map({True: "success", False: "timeout"})
         return pd.concat([frame, own], ignore_index=True)
 
     evidence.edit_table(root, TABLE, beside)
@@ -96,3 +103,30 @@ def test_a_comparison_without_a_planner_says_so(ladder):
     assert UNPLANNED in settings_of(ladder, "D").caveats
     assert UNPLANNED in judge(ladder, "D").caveats
     assert UNPLANNED not in _with_planner(ladder)[1].caveats
+
+
+@pytest.mark.parametrize(("every", "said"), [(1, 0), (4, 1)])
+def test_a_planner_that_is_worth_less_than_a_simple_method_is_said_to_be(ladder, every, said):
+    _with_planner(ladder, every)
+    caveats = [text for text in judge(ladder, "D").caveats if text.startswith(PLANNER)]
+    assert len(caveats) == said
+    if said:
+        assert "is worth 0.25 in success" in caveats[0] and "nothing against a better" in caveats[0]
+
+
+def test_a_planner_alone_is_held_to_what_the_plan_says_of_a_simple_method(ladder):
+    """As in a rehearsal, which may leave out the others."""
+    reader, settings = _with_planner(ladder, 3)
+    alone = settings.model_copy(update={"baselines": (PLANNER,)})
+    planned = settings.planned_effect[0]
+    assert planned > 1 / 3
+    [caveat] = planner_said(SimpleNamespace(evidence=reader, settings=alone))
+    assert f"the plan's simple method {planned:.2f}" in caveat
+
+
+def test_of_a_planner_that_did_not_meet_the_plan_nothing_is_said(ladder):
+    _with_planner(ladder, 4)
+    evidence.edit_table(
+        ladder, TABLE, lambda f: f[(f["method"] != PLANNER) | (f["perturbation"] == "nominal")]
+    )
+    assert not [text for text in judge(ladder, "D").caveats if text.startswith(PLANNER)]
