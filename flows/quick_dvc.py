@@ -64,7 +64,11 @@ def _counted_through(told: Sequence[str]) -> str:
     for text in told:
         own = sorted({int(number) for number in ANCHOR.findall(text)})
         numbers = {number: before + place for place, number in enumerate(own, start=1)}
-        texts.append(ANCHOR.sub(lambda found, to=numbers: f"{to[int(found[0])]:03d}", text))
+
+        def counted(found: re.Match[str], to: dict[int, int] = numbers) -> str:
+            return f"{to[int(found[0])]:03d}"
+
+        texts.append(ANCHOR.sub(counted, text))
         before += len(own)
     return "".join(texts)
 
