@@ -8,7 +8,7 @@ import multiprocessing
 import sys
 from collections.abc import Callable, Sequence
 from multiprocessing.context import ForkServerContext
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from dask import config
 from dask.base import compute as compute_local
@@ -18,7 +18,7 @@ Shard = TypeVar("Shard")
 Result = TypeVar("Result")
 
 LOCAL = "local"
-FORKED = "forkserver"
+FORKED: Literal["forkserver"] = "forkserver"
 OWN = ("genpolicy.", "gates.")
 """Of these the server imports what is imported here, and with them what they import."""
 

@@ -24,8 +24,9 @@ ALLOWED: dict[str, str] = {
         "the way out of `ask_human`: a person's, so nothing of ours may take it"
     ),
     "genpolicy.compiled:HashedFolder.get_cache_path": ("numba asks its locators for it"),
+    "genpolicy.integrity.documents:_QuickLoader.get_single_node": YAML,
     "genpolicy.integrity.documents:_StrictLoader.compose_node": YAML,
-    "genpolicy.integrity.documents:_StrictLoader.construct_mapping": YAML,
+    "genpolicy.integrity.documents:_UniqueKeys.construct_mapping": YAML,
     "genpolicy.robot.collision:CollisionModel.in_collision": (
         "for the worlds of tasks outside the tree; the one of the tests asks it at every tick"
     ),

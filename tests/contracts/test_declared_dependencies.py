@@ -16,7 +16,6 @@ PRODUCT = ("genpolicy", "gates", "stages", "flows")
 SUPPORT = ("tests", "benchmarks")
 EXTRAS = ("zarr", "hdf5", "onnx", "rerun")
 NOT_IMPORTED = {
-    "dvc": "flows run it as a process (`dvc repro`), so that it stays out of ours",
     "onnxscript": "torch.onnx writes with it",
     "fastapi": "not ours: the bound keeps Prefect's server alive, see the comment there",
 }

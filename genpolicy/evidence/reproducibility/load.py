@@ -57,7 +57,7 @@ def measure_counts(plan: LatencyPlan, judged: Contender) -> list[CandidatesRow]:
 
 
 @contextmanager
-def competing() -> Iterator[list["subprocess.Popen[bytes]"]]:
+def competing() -> Iterator[list[subprocess.Popen[bytes]]]:
     """A process on every core that multiplies matrices inside the block; yields them.
 
     Raises:
@@ -73,7 +73,7 @@ def competing() -> Iterator[list["subprocess.Popen[bytes]"]]:
 
 
 @contextmanager
-def _burner() -> Iterator["subprocess.Popen[bytes]"]:
+def _burner() -> Iterator[subprocess.Popen[bytes]]:
     """Popen waits for it at the end of the block, with its input closed."""
     with subprocess.Popen(
         [sys.executable, burning.__file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE
