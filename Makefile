@@ -3,9 +3,9 @@
 #   make ladder   build the environment once, run the pipeline, print the table of the gates
 #   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
 #   make test     format, lint, types, import contracts, tests
+#   make long     the tests that `make test` leaves out because they take minutes each (half an hour)
 #   make soak     twenty million random events against executor, stub and supervisor, ten thousand
-#                 random chunks at every millisecond (an hour and a half; it goes on where it was
-#                 cut), and a small ladder with an energy as a candidate
+#                 random chunks at every millisecond (an hour and a half; it goes on where it was cut)
 #   make lint     make test without the tests
 #   make lerobot  LeRobot's own environment in build/lerobot, to train and serve its policies
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
@@ -55,7 +55,7 @@ export PATH := $(BIN):$(PATH)
 SHA256 := $(shell command -v sha256sum >/dev/null && echo sha256sum || echo 'shasum -a 256')
 WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1)
 
-.PHONY: help env ladder smoke test soak lerobot lint doctor clean
+.PHONY: help env ladder smoke test long soak lerobot lint doctor clean
 
 help:
 	@sed -n '1,24p' Makefile | sed 's/^# \{0,1\}//'
@@ -86,6 +86,9 @@ test: env
 	@code=0; $(MAKE) --no-print-directory lint || code=1; \
 	python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder || code=1; exit $$code
 
+long: env
+	@LONG=1 python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder -m long
+
 # LeRobot needs a newer Python and older libraries than ours: it never shares our environment.
 lerobot:
 	@if ! "$(PYTHON_LEROBOT)" -c '' 2>/dev/null; then \
@@ -98,7 +101,6 @@ lerobot:
 soak: env
 	@python -m benchmarks.soak chunks --wanted 10000 --seed $(SEED)
 	@python -m benchmarks.soak events --wanted 20000000 --seed $(SEED)
-	@LONG=1 python -m pytest -q tests/ladder/test_whole_way.py
 
 lint: env
 	@code=0; ruff check . || code=1; ruff format --check . || code=1; \

@@ -1,6 +1,7 @@
 """A small recorded dataset of the real task, and barely trained checkpoints on it."""
 
 import copy
+import os
 import shutil
 import sys
 from collections.abc import Iterator
@@ -31,7 +32,7 @@ from genpolicy.tasks.api import load_task
 from genpolicy.tasks.demonstrations import record_session
 
 sys.path.insert(0, str(Path(__file__).parent))
-from order import longest_first
+from order import LONG, leave_out_long, longest_first
 
 PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
@@ -56,8 +57,10 @@ POLICY = PolicySettings(
 )  # fmt: skip
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     longest_first(items)
+    if LONG not in os.environ:
+        config.hook.pytest_deselected(items=leave_out_long(items))
 
 
 def write_situations(folder, rows):

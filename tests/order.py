@@ -1,4 +1,7 @@
-"""Which files of tests begin first, of several processes that each take a file at a time.
+"""Which tests are left out, and which files begin first of several processes that take one each.
+
+Tests marked `long` take minutes and look at the whole of what others look at in parts: they run
+where the environment says LONG (`make long`), and are counted as deselected elsewhere.
 
 A process that has nothing left waits for the one that took a long file last. So the long ones come
 first. The first of them builds the ladder that the others of its folder copy; those before the next
@@ -9,7 +12,9 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 TESTS = Path(__file__).parent
-LONG = (
+LONG = "LONG"
+FIRST = (
+    "ladder/test_repro.py",
     "ladder/test_whole_way.py",
     "wall_clock/test_run.py",
     "gates/test_criteria.py",
@@ -28,7 +33,6 @@ LONG = (
     "execution/test_soak.py",
     "wall_clock/test_proxy.py",
     "ladder/test_kills.py",
-    "ladder/test_repro.py",
     "ladder/test_who_failed_stays_out.py",
     "ladder/test_refusals.py",
     "ladder/test_bundle.py",
@@ -44,11 +48,20 @@ class Item(Protocol):
 
     path: Path
 
+    def get_closest_marker(self, name: str) -> object: ...
+
 
 T = TypeVar("T", bound=Item)
 
 
 def longest_first(items: list[T]) -> None:
     """Sort tests by their file: the long ones as listed, then the others as they were."""
-    places = {TESTS / name: place for place, name in enumerate(LONG)}
+    places = {TESTS / name: place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def leave_out_long(items: list[T]) -> list[T]:
+    """Take out those marked `long`; returns them."""
+    left = [item for item in items if item.get_closest_marker("long")]
+    items[:] = [item for item in items if not item.get_closest_marker("long")]
+    return left

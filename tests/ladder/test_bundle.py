@@ -168,6 +168,7 @@ def test_a_forged_bundle_is_not_proved(
         proved(path, tmp_path)
 
 
+@pytest.mark.long
 def test_a_verdict_that_the_evidence_does_not_give_is_refused(bundle: Path, tmp_path: Path) -> None:
     def worse(index: dict, entries: Entries) -> None:
         index["verdicts"]["D"] = "FAIL"

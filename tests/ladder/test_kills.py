@@ -18,7 +18,12 @@ from flows.reproduce import stage_environment
 # reading, the work, the writing. Drawn once; the last ones are near the end on a quick machine.
 KILLS_PER_STAGE = 2
 DVC_STARTS_S = 2.0
-STAGES = ("ingest", "audit", "gate_a", "shadow")
+STAGES = (
+    "ingest",
+    pytest.param("audit", marks=pytest.mark.long),
+    "gate_a",
+    pytest.param("shadow", marks=pytest.mark.long),
+)
 
 
 def start(workspace: Path, stage: str) -> "subprocess.Popen[bytes]":

@@ -247,6 +247,7 @@ def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str
     assert hashes(copy, "artifacts", "reports") == before, "a refused stage wrote something"
 
 
+@pytest.mark.long
 def test_an_empty_threshold_set_stops_repro(copy: Path) -> None:
     unlimited(copy, "gate_b")
     outcome, ran = repro(copy, "shadow")
@@ -258,6 +259,7 @@ def test_an_empty_threshold_set_stops_repro(copy: Path) -> None:
     assert report["verdict"] == "INCONCLUSIVE"
 
 
+@pytest.mark.long
 def test_lifting_the_cause_lets_the_ladder_go_on_to_the_same_bytes(copy: Path) -> None:
     before = hashes(copy, "artifacts", "reports")
     params = (copy / "params.yaml").read_bytes()

@@ -140,6 +140,7 @@ def test_an_edited_report_is_put_right_by_repro(copy: Path) -> None:
     assert report.read_bytes() == before
 
 
+@pytest.mark.long
 def test_the_number_of_workers_changes_no_byte(copy: Path) -> None:
     """Two workers made the finished ladder; one makes the same recordings, dataset and audit."""
     folders = [f"artifacts/{name}" for name in ("record", "ingest", "audit")]

@@ -35,9 +35,14 @@ CASES = {
     "another gate was named": ((BIT, Expected("B", refusal=AT_A.refusal)), "elsewhere"),
     "nothing was planted": ((lambda workspace: None, AT_A), "not at all"),
 }
+PROVED_WHOLE = "nothing was planted"
+"""The ladder is proved to its end."""
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.long] * (name == PROVED_WHOLE)) for name in CASES],
+)
 def test_a_planted_wrong_is_counted(finished: Path, tmp_path: Path, name: str) -> None:
     (plant, expected), counted = CASES[name]
     wrong = Wrong(name, "test", name, "small", plant, expected)

@@ -27,6 +27,7 @@ def _said(workspace: Path, gate: str) -> dict[str, str]:
     return dict(read_report(workspace, gate)[0].candidates)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("gate", "criterion", "plant", "above"),
     [

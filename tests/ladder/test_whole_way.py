@@ -1,20 +1,19 @@
-"""Simple methods and a policy of somebody else go the whole way that they can, to the proof.
+"""Plain behaviour cloning and an energy go the whole way that they can: timed, shadowed, stressed.
 
-Plain behaviour cloning and an energy are candidates as any other where `params.yaml` names them so;
-by default they stand at Gate A alone. With them goes a policy in a process of its own, as somebody
-else would bring it: the flow that the finished ladder trained. What follows Gate A runs again with
-these, and the independent proof draws their chunks again. The energy, which samples longest, goes
-along in `make soak`, which sets `LONG`.
+They are candidates as any other where `params.yaml` names them so; by default they stand at Gate A
+alone. With them goes a policy in a process of its own, as somebody else would bring it: the flow
+that the finished ladder trained. What follows Gate A runs again with these three, and the
+independent proof draws their chunks again.
 """
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pytest
 from brought import NAME, bring_flow
 from ladder_workspace import edit_params, flip_a_bit, repro
 
@@ -23,9 +22,10 @@ from genpolicy.policies.energy import EnergyNetwork
 from genpolicy.policies.policy import load_policy
 
 STEPS, POPULATION = 4, 16
-ENERGY = {"ibc": {"name": "langevin", "steps": STEPS, "population": POPULATION}}
-WITH_ENERGY = "LONG" in os.environ
-ADDED = {**(ENERGY if WITH_ENERGY else {}), "bc": {"name": "direct"}}
+ADDED = {
+    "ibc": {"name": "langevin", "steps": STEPS, "population": POPULATION},
+    "bc": {"name": "direct"},
+}
 BEHIND_GATE_A = [
     "train_generators", "reload", "latency", "gate_b", "shadow", "gate_c", "wall_clock",
     "stress", "monitors", "gate_d", "failure_search", "card", "gate_e",
@@ -42,7 +42,8 @@ def methods(workspace: Path, table: str) -> set[str]:
     return set(pd.read_parquet(workspace / "artifacts" / table)["method"])
 
 
-def test_simple_methods_and_a_policy_of_somebody_else_as_candidates(copy: Path) -> None:
+@pytest.mark.long
+def test_ibc_plain_bc_and_a_policy_of_somebody_else_as_candidates(copy: Path) -> None:
     bring_flow(copy)
 
     def add(params: dict[str, Any]) -> None:
@@ -60,21 +61,18 @@ def test_simple_methods_and_a_policy_of_somebody_else_as_candidates(copy: Path) 
         "latency/latency.parquet", "shadow/candidates.parquet", "stress/rollouts.parquet",
         "stress/overruns.parquet",
     ):  # fmt: skip
-        assert ("ibc" in methods(copy, table)) == WITH_ENERGY, table
+        assert "ibc" in methods(copy, table), table
         # One action is over when it comes, so that nothing of it reaches the stub: not admitted.
         assert ("bc" in methods(copy, table)) == (not table.startswith("stress")), table
     report = json.loads((copy / "reports" / "gate_c.json").read_text())
-    assert report["candidates"]["bc"] == "INCONCLUSIVE"
-    if WITH_ENERGY:
-        assert report["candidates"]["ibc"] == "PASS"
-        folder = copy / "artifacts/train_generators/ibc/seed_0"
-        assert isinstance(load_policy(folder).checkpoint.network, EnergyNetwork)
+    assert (report["candidates"]["ibc"], report["candidates"]["bc"]) == ("PASS", "INCONCLUSIVE")
     nfe = pd.read_parquet(copy / "artifacts/reload/nfe.parquet").set_index("method")
     # Every move scores all candidates once, and the last ones are scored once more.
-    evaluations = {"ibc": STEPS + 1, "bc": 1}
-    for method in ADDED:
+    for method, evaluations in (("ibc", STEPS + 1), ("bc", 1)):
         row = nfe.loc[method]
-        assert row["recorded"] == row["counted"] == row["expected"] == evaluations[method]
+        assert row["recorded"] == row["counted"] == row["expected"] == evaluations
+    folder = copy / "artifacts/train_generators/ibc/seed_0"
+    assert isinstance(load_policy(folder).checkpoint.network, EnergyNetwork)
     samples = pd.read_parquet(copy / "artifacts/reload/samples.parquet")
     own = samples[samples["method"].isin(list(ADDED))]
     assert (own["sha256_trained"] == own["sha256_reloaded"]).all() and len(own) > 0
