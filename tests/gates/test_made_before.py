@@ -186,3 +186,33 @@ def test_what_may_answer_otherwise_another_time_is_told_apart_by_nothing(monkeyp
     assert made_before._code_of_fixed(function) is None
     monkeypatch.setattr(timing, "require_as_timed", function)
     assert made_before._replaced and not made_before._fixed
+
+
+def test_evidence_of_another_kind_is_measured_each_time(ladder, _made):
+    """As tables in memory, which no file tells apart."""
+
+    class Other(Evidence):
+        """Read from wherever it likes."""
+
+    item, _, *others = _asked_first(ladder, "D")
+    for kind, measured in ((Other, 2), (Evidence, 1)):
+        made_before._known.clear()
+        _made.clear()
+        for _ in range(2):
+            made_before.answer(item, kind(ladder), *others)
+        assert _made == [item.id] * measured
+
+
+def _asked_first(root, gate):
+    """What the first criterion of a gate is asked with."""
+    asked = []
+
+    def noted(*given):
+        asked.append(given)
+        return made_before._answer(*given)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "_answer", noted)
+        judge(root, gate)
+    made_before.forget()
+    return asked[0]
