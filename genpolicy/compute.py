@@ -57,7 +57,7 @@ def map_shards(
     tasks: list[Any] = [delayed(function, pure=False)(shard) for shard in shards]
     run_local: Any = compute_local
     if scheduler == LOCAL:
-        forked()
+        forked()  # names what the server imports; Dask asks for the same context by its name
         with config.set({"multiprocessing.context": FORKED}):
             return list(run_local(*tasks, scheduler="processes", num_workers=workers, chunksize=1))
     from distributed import Client  # noqa: PLC0415  (slow import, only with a cluster)

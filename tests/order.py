@@ -15,7 +15,6 @@ TESTS = Path(__file__).parent
 LONG = "LONG"
 FIRST = (
     "ladder/test_repro.py",
-    "ladder/test_whole_way.py",
     "wall_clock/test_run.py",
     "gates/test_criteria.py",
     "gates/test_commands_of_a_ladder.py",
@@ -32,6 +31,7 @@ FIRST = (
     "contracts/test_dead_code.py",
     "execution/test_soak.py",
     "wall_clock/test_proxy.py",
+    "ladder/test_whole_way.py",
     "ladder/test_kills.py",
     "ladder/test_who_failed_stays_out.py",
     "ladder/test_refusals.py",

@@ -21,8 +21,8 @@ from gates.stress.gains import by_condition, in_success, inside_envelope, least_
 from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.planned import planner_said
-from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings, rollouts
-from gates.stress.utility import mean_worth
+from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings
+from gates.stress.utility import mean_worths
 from gates.stress.visited import visited_said
 from gates.stress.weights import listed
 from gates.words import points
@@ -70,13 +70,12 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
 
 
 def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
-    """The simple method that is worth most over all planned conditions, as pairs are compared.
+    """The simple method that is worth most.
 
     Raises:
-        MissingEvidenceError: A baseline was not run under every condition, as often as planned.
+        MissingEvidenceError: As `mean_worths`.
     """
-    rows = {method: rollouts(evidence, settings, method) for method in settings.baselines}
-    means = {method: mean_worth(evidence, settings, method, of) for method, of in rows.items()}
+    means = mean_worths(evidence, settings)
     return max(means, key=lambda name: means[name])  # of equals the one that is named first
 
 

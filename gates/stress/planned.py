@@ -6,8 +6,8 @@ whoever beats it has shown nothing against a better one.
 
 from gates.engine import Judged
 from gates.evidence import MissingEvidenceError
-from gates.stress.rollouts import StressSettings, rollouts
-from gates.stress.utility import mean_worth
+from gates.stress.rollouts import StressSettings
+from gates.stress.utility import mean_worths
 from genpolicy.contract.planner import PLANNER
 
 
@@ -21,12 +21,7 @@ def planner_said(judged: Judged) -> list[str]:
     if PLANNER not in settings.baselines:
         return []
     try:
-        worth = {
-            method: mean_worth(
-                judged.evidence, settings, method, rollouts(judged.evidence, settings, method)
-            )
-            for method in settings.baselines
-        }
+        worth = mean_worths(judged.evidence, settings)
     except MissingEvidenceError:
         return []
     own = worth.pop(PLANNER)

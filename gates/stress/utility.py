@@ -22,7 +22,7 @@ import pandas as pd
 
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.recoveries import ROLLOUT, recoveries
-from gates.stress.rollouts import StressSettings
+from gates.stress.rollouts import StressSettings, rollouts
 from gates.stress.weights import DURATION, FALLBACK, RECOVERY, by_cost
 
 
@@ -63,6 +63,17 @@ def mean_worth(
         MissingEvidenceError: As `utilities`.
     """
     return float(utilities(evidence, settings, method, rows).mean())
+
+
+def mean_worths(evidence: Evidence, settings: StressSettings) -> dict[str, float]:
+    """What each simple method is worth over all planned conditions, as pairs are compared.
+
+    Raises:
+        MissingEvidenceError: As `utilities`, or one was not run under every condition, as often as
+            planned.
+    """
+    rows = {method: rollouts(evidence, settings, method) for method in settings.baselines}
+    return {method: mean_worth(evidence, settings, method, of) for method, of in rows.items()}
 
 
 def _seconds(
