@@ -53,6 +53,8 @@ class Criterion:
         per_candidate: Whether each method that stands for promotion is asked.
         always: Whether it may never be declared not applicable: it guards people or the proof.
         derived: Limit that follows from the gate's settings, where `params.yaml` says `derived`.
+        applies: What of the evidence shows that it does apply, in words, empty where nothing does;
+            takes what `measure` takes. Asked where it is declared not applicable.
     """
 
     measure: Callable[..., Measured]
@@ -62,6 +64,7 @@ class Criterion:
     per_candidate: bool
     always: bool
     derived: Callable[[Any], float] | None
+    applies: Callable[..., str] | None = None
 
     @property
     def id(self) -> str:
@@ -77,11 +80,14 @@ def criterion(
     per_candidate: bool = False,
     always: bool = False,
     derived: Callable[[Any], float] | None = None,
+    applies: Callable[..., str] | None = None,
 ) -> Callable[[Callable[..., Measured]], Criterion]:
     """Make a criterion of the function that measures it; arguments as in `Criterion`."""
 
     def of(measure: Callable[..., Measured]) -> Criterion:
-        return Criterion(measure, question, look_at, comparison, per_candidate, always, derived)
+        return Criterion(
+            measure, question, look_at, comparison, per_candidate, always, derived, applies
+        )
 
     return of
 

@@ -156,7 +156,8 @@ def judge(
     Args:
         spec: The gate.
         evidence: What it may read.
-        limits: By criterion; one without is INCONCLUSIVE, one not applicable a caveat, not asked.
+        limits: By criterion; one without is INCONCLUSIVE, one not applicable a caveat, and asked
+            only where the evidence shows that it does apply.
         settings: Recorded in the report.
         given: What the measures take in place of the settings, where a gate knows more.
         candidates: Methods that stand for promotion.
@@ -168,11 +169,15 @@ def judge(
     """
     inputs = settings.under(limits) if given is None else given
     answers = []
-    for item in (one for one in spec.criteria if one.id not in limits.waived):
-        limit = limits.of.get(item.id)
+    for item in spec.criteria:
         names = candidates if item.per_candidate else (None,)
-        asked = (name for name in names if not settings.excepted(item.id, name))
-        answers += [_answer(item, evidence, inputs, limit, name) for name in asked]
+        for name in (one for one in names if not settings.excepted(item.id, one)):
+            if item.id not in limits.waived:
+                answers.append(_answer(item, evidence, inputs, limits.of.get(item.id), name))
+            elif shown := _applies(item, evidence, inputs, name):
+                told = {"reason": f"declared not applicable, but {shown}"}
+                answer = _answer(item, evidence, inputs, None, name)
+                answers.append(answer.model_copy(update=told))
     evidence.bind(*spec.bind)
     lacking, about = _lacking(evidence), spec.below is not None
     ruled = rule(exceptions, spec.criteria, answers, limits, candidates=about, lacking=lacking)
@@ -242,6 +247,16 @@ def _answer(
         counted=measured.counted,
         recount=measured.recount,
     )
+
+
+def _applies(item: Criterion, evidence: Evidence, inputs: object, candidate: str | None) -> str:
+    """What shows that a criterion applies which was declared not to; empty where nothing does."""
+    if item.applies is None:
+        return ""
+    try:
+        return item.applies(evidence, inputs, *([] if candidate is None else [candidate]))
+    except (MissingEvidenceError, KeyError):
+        return ""  # the criteria that are asked say what is missing
 
 
 def _lacking(evidence: Evidence) -> list[str]:

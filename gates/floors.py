@@ -181,6 +181,12 @@ def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
     return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
 
 
+def _confident(*gates: Gate) -> list[Bound]:
+    """Every gate that draws an interval."""
+    wrong = "what is wrong more often than once in ten is no bound"
+    return [Bound(gate, "confidence", ">=", 0.9, wrong) for gate in gates]
+
+
 def _executed(gate: Gate) -> list[Bound]:
     """Fixtures of the simulated cell that stop what went wrong, and what makes a chunk void."""
     silence = "a stub that goes on in silence executes what nobody commands any more"
@@ -199,6 +205,7 @@ def _executed(gate: Gate) -> list[Bound]:
 FOUND = "refused_recordings_accounted"
 PINNED = "what comes back otherwise than it was judged is another policy"
 BOUNDS: tuple[Bound, ...] = (
+    *_confident("A", "B", "C", "D"),
     *_counts("A", "whoever trains on a defect of the data learns it", "data_defects"),
     *_counts("A", "a recording that vanished may be the one that fails", FOUND),
     *_counts("A", "a comparison with other settings compares nothing", "baselines_matched"),
@@ -279,7 +286,6 @@ BOUNDS: tuple[Bound, ...] = (
     Bound("D", "reset_upper", "<=", 0.1, "each protective stop sends a person to the arm"),
     Bound("D", "verdict_reachable", ">=", 0.8, "a trial that seldom ends right proves nothing"),
     Bound("D", "stress.starts", ">=", 59, "fewer bound no p95, whatever the confidence"),
-    Bound("D", "confidence", ">=", 0.9, "what is wrong more often than once in ten is no bound"),
     Bound("D", "stress.alpha", "<=", 0.1, "a wrong promotion once in ten trials at the most"),
     Bound("D", "stress.planned_effect", "<=", 0.5, "less is worth promoting too", of=_gain),
     Bound("D", "stress.margin", ">=", 0.0, "a candidate that is worse is not promoted"),

@@ -40,10 +40,13 @@ class Planned(NamedTuple):
 PLANNED: Mapping[str, Planned] = {
     "seed": Planned("", "A"),
     "record.episodes": Planned(">=", "A"),
+    "record.shares": Planned("", "A"),
     "ingest.train": Planned("", "A"),
     "ingest.validation": Planned("", "A"),
     "policy.seeds": Planned("", "A"),
+    "policy.network": Planned("", "A"),
     "policy.training.updates": Planned("", "A"),
+    "policy.training.batch_size": Planned("", "A"),
     PLACE: Planned("", "A"),
     "train_generators.samplers": Planned("", "B"),
     "candidates": Planned("", "B"),
@@ -53,11 +56,14 @@ PLANNED: Mapping[str, Planned] = {
     "gate_a.generative_baselines": Planned("", "A"),
     "gate_a.chunked_baseline": Planned("", "A"),
     "gate_a.remedies": Planned("", "A"),
+    "gate_a.one_mode": Planned("", "A"),
     "gate_a.conditioning_factors": Planned("", "A"),
     "policy.fixtures": Planned(">=", "B"),
     "latency.warm": Planned(">=", "B"),
     "latency.cold": Planned(">=", "B"),
     "latency.declared": Planned("", "B"),
+    "reload.samples": Planned(">=", "B"),
+    "gate_b.budget_reference": Planned("", "B"),
     "gate_b.mode_minimum_share": Planned(">=", "B"),
     "gate_c.required_fixtures": Planned("", "C"),
     "gate_c.mode_observations": Planned(">=", "C"),
@@ -73,6 +79,7 @@ PLANNED: Mapping[str, Planned] = {
     "stress.joining": Planned("", "B"),
     "stress.person": Planned("", "D"),
     "gate_d.tolerances": Planned("", "D"),
+    "gate_e.maximum_days": Planned("<=", "E"),
 }
 """What the plan names beside limits."""
 IF_STATED: Mapping[str, Planned] = {
@@ -80,8 +87,7 @@ IF_STATED: Mapping[str, Planned] = {
     "gate_a.waived_checks": Planned("", "A"),
     "gate_d.utility": Planned("", "D"),
 }
-"""What it names only where it is stated: every factor is asked, no question is waived, and without
-weights success is compared, as in every plan that is older than they are."""
+"""What it names only where it is stated; older plans ask every factor and compare success."""
 STATED: Mapping[str, Planned] = {**PLANNED, **IF_STATED}
 SECTIONS: Mapping[str, Gate] = {
     "horizons": "A",
@@ -95,18 +101,16 @@ SECTIONS: Mapping[str, Gate] = {
     "shadow": "C",
 }
 """Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
-SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
-    (
-        "feasibility.position_change_limit_m",
-        "execution.deadline_s",
-        "execution.watchdog_s",
-        "execution.maximum_age_s",
-        "execution.maximum_divergence_m",
-        "execution.maximum_scene_shift_m",
-        "execution.force_limit_n",
+SECTIONS_STRICT: Mapping[str, str] = {
+    **dict.fromkeys(
+        (
+            "feasibility.position_change_limit_m", "execution.deadline_s", "execution.watchdog_s",
+            "execution.maximum_age_s", "execution.maximum_divergence_m",
+            "execution.maximum_scene_shift_m", "execution.force_limit_n",
+        ), "<=",
     ),
-    "<=",
-)
+    **dict.fromkeys(("measure_baselines.samples", "measure_factors.samples"), ">="),
+}  # fmt: skip
 """On which side their settings are strict, those of each phase alike; others on neither."""
 CAUSE = "cause"
 CAUSE_STRICT: Mapping[str, str] = {
@@ -131,12 +135,12 @@ AT_LEAST = frozenset(
         "owners_signed", "not_expired",
     )
 )  # fmt: skip
-"""Criteria whose number may not be lower than their limit; of all others it may not be higher.
-Written out, not read from the plan: who edits the plan would edit what counts as looser."""
-HEAD = (
-    "# Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves\n"
-    "# afterwards shows in the report of every gate that judges by it and on the card.\n"
-)
+"""Criteria that may not be lower than their limit, all others not higher; who edits the plan
+would edit what counts as looser, were it read from there."""
+HEAD = """\
+# Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves
+# afterwards shows in the report of every gate that judges by it and on the card.
+"""
 Kind = Literal["loosened", "tightened", "changed"]
 KINDS: tuple[Kind, ...] = ("loosened", "tightened", "changed")
 
@@ -299,10 +303,8 @@ def _strict(place: str) -> str:
 
 def _all_settings(params: Mapping[str, Any]) -> dict[str, Any]:
     """Every setting of the sections that the plan names whole, by its place."""
-    found: dict[str, Any] = {}
-    for name in SECTIONS:
-        found |= _leaves(name, params.get(name, {}))
-    return found
+    each = (_leaves(name, params.get(name, {})) for name in SECTIONS)
+    return {place: value for found in each for place, value in found.items()}
 
 
 def _leaves(place: str, value: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from gates.may_differ import PLACE, Listed
 from gates.report import Owner
@@ -81,6 +81,18 @@ class NeedSettings(GateSettings):
         default_factory=dict
     )
     cause: dict[str, dict[str, tuple[float, str]]]
+
+    @field_validator("samples")
+    @classmethod
+    def _as_many_chances(cls, samples: int, info: ValidationInfo) -> int:
+        """A remedy of which fewer samples were measured than a candidate draws gets fewer draws."""
+        redraws = info.data.get("redraws", samples)
+        if samples < redraws:
+            raise ValueError(
+                f"{samples} samples cannot show what {redraws} draws (stress.samples) reach: a "
+                "simpler policy gets as many chances as a candidate"
+            )
+        return samples
 
     @property
     def caveats(self) -> tuple[str, ...]:

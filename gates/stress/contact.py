@@ -10,30 +10,35 @@ from collections.abc import Sequence
 import numpy as np
 
 from gates.engine import Judged
-from gates.evidence import MissingEvidenceError, numbers
-from gates.stress.rollouts import rollouts
+from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.stress.rollouts import StressSettings, rollouts
 
-FORCE = "force_peak_p95_n"
 UNTOUCHED = re.compile(r"(\S+): (no contact in [\d,]+ of [\d,]+ rollouts)\b")
 """How the caveat of a candidate that touched nothing begins: its name, and what was seen."""
 
 
-def contact_said(judged: Judged) -> list[str]:
-    """A caveat for each candidate that touched nothing in any planned condition.
+def touched(evidence: Evidence, settings: StressSettings, candidate: str) -> str:
+    """That a candidate touched something, in how many rollouts and how hard; empty if it did not.
 
-    And for each that touched something although its force was declared not to matter.
+    Asked where force was declared not to matter: a limit that nobody names holds no force.
     """
+    forces = numbers(rollouts(evidence, settings, candidate), "force_peak_n")
+    if not np.any(forces > 0):
+        return ""
+    return (
+        f"it touched something in {np.sum(forces > 0):,} of {len(forces):,} rollouts, with up to "
+        f"{forces.max():.3g} N"
+    )
+
+
+def contact_said(judged: Judged) -> list[str]:
+    """A caveat for each candidate that touched nothing in any planned condition."""
     said = []
     for name in judged.candidates:
         try:
             forces = numbers(rollouts(judged.evidence, judged.settings, name), "force_peak_n")
         except MissingEvidenceError:
             continue  # the criteria say what is missing
-        if np.any(forces > 0) and FORCE in judged.settings.limits.waived:
-            said.append(
-                f"{name}: touched something in {np.sum(forces > 0):,} of {len(forces):,} rollouts, "
-                f"with up to {forces.max():.3g} N, and no limit of force was asked."
-            )
         if np.all(forces == 0):
             count = f"{len(forces):,} of {len(forces):,}"
             said.append(

@@ -16,6 +16,7 @@ from gates.evidence import Evidence, MissingEvidenceError, counts, flags, number
 from gates.floors import OLDEST_ACTION_S
 from gates.recount import AtLeast, Subset, Term, is_one
 from gates.report import Recount
+from gates.stress.contact import touched
 from gates.stress.rollouts import (
     CURVES,
     DRILL,
@@ -272,6 +273,7 @@ def _rollouts_with(rows: pd.DataFrame, hit: Term, settings: StressSettings) -> M
     question="How hard does it touch?",
     look_at="Contact controller: look at stale actions and phase transitions, then gains.",
     per_candidate=True,
+    applies=touched,
 )
 def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the peak contact force that 95 % of the rollouts keep, N.
@@ -283,11 +285,11 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
     forces = numbers(rows, "force_peak_n")
     if not np.all(forces >= 0):
         raise MissingEvidenceError("a force is negative")
-    touched = rows[forces > 0]["start"].nunique()
+    seen = rows[forces > 0]["start"].nunique()
     fewest = draws_for_quantile(0.95, settings.confidence)
-    if touched < fewest:
+    if seen < fewest:
         raise MissingEvidenceError(
-            f"hardly exercised: contact on {touched} of {rows['start'].nunique()} starts, in any "
+            f"hardly exercised: contact on {seen} of {rows['start'].nunique()} starts, in any "
             f"condition; {fewest} are needed to bound what 95 % keep"
         )
 

@@ -20,11 +20,21 @@ from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, Stre
 STUB = f"{STRESS}/stub.parquet"
 
 
+def began_to_recover(evidence: Evidence, settings: StressSettings, candidate: str) -> str:
+    """That recovery began, and how often it did; empty where it never did.
+
+    Asked where recovery was declared not to matter.
+    """
+    rows = recoveries(evidence, settings, candidate)
+    return f"recovery began {len(rows):,} times" if len(rows) else ""
+
+
 @criterion(
     ">=",
     question="When recovery begins, does it help, by more than new samples?",
     look_at="Recovery: read by phase and cause how it ended, and whether the policy went on.",
     per_candidate=True,
+    applies=began_to_recover,
 )
 def recovery_success_lower(
     evidence: Evidence, settings: StressSettings, candidate: str

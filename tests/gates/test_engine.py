@@ -10,7 +10,7 @@ from asking import SPEC
 
 from gates.criterion import Measured
 from gates.engine import judge, promoted_below, upstream_hashes
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.installed import LIBRARIES, environment
 from gates.more import ASTRIDE, INSIDE
 from gates.pipeline import TASK_IDENTITY, Basis
@@ -61,6 +61,29 @@ def test_a_derived_limit_follows_from_the_settings(tmp_path, b, verdict):
     }
     report = _judge(tmp_path, 1, b, of=limits)
     assert (report.verdict, report.criteria[1].threshold) == (verdict, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("shown", "verdict"), [("it was there", "INCONCLUSIVE"), ("", "PASS"), (None, "PASS")]
+)
+def test_what_was_declared_not_to_apply_is_asked_where_the_evidence_shows_it(
+    tmp_path, shown, verdict
+):
+    def applies(evidence, settings):
+        if shown is None:
+            raise MissingEvidenceError("nobody looked")
+        return shown
+
+    first, second = SPEC.criteria
+    spec = replace(SPEC, criteria=(first, replace(second, applies=applies)))
+    limits = {first.id: Limit(1.0, "r", "model")}
+    waived = {second.id: Waiver("no such thing here", "controller")}
+    _judge(tmp_path, 1, 1)
+    report = judge(spec, Evidence(tmp_path), Limits(limits, waived), GateSettings())
+    assert report.verdict == verdict
+    assert any("no such thing here" in text for text in report.caveats)
+    told = [answer.reason for answer in report.criteria if answer.id == second.id]
+    assert told == (["declared not applicable, but it was there"] if shown else [])
 
 
 def test_what_does_not_apply_is_a_caveat_and_decides_nothing(tmp_path):

@@ -43,6 +43,10 @@ def _moved(change):
         (("stress", "perturbations"), {"nominal": {}}, "changed"),
         (("seed",), 2, "changed"),
         (("confidence",), 0.9, "loosened"),
+        (("reload", "samples"), 1, "loosened"),
+        (("gate_b", "budget_reference"), "act", "changed"),
+        (("gate_a", "one_mode"), "bc", "changed"),
+        (("gate_e", "maximum_days"), 300, "loosened"),
     ],
 )
 def test_what_moved_is_told_from_what_was_planned(path, value, kind):
@@ -125,13 +129,15 @@ def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed(
     [
         ("gate_b", "mode_minimum_share", 0.01), ("gate_c", "mode_observations", 3),
         ("shadow", "observations", 3), ("record", "episodes", 30), ("policy", "fixtures", 1),
-        ("latency", "warm", 1), ("latency", "cold", 1),
+        ("latency", "warm", 1), ("latency", "cold", 1), ("measure_baselines", "samples", 4),
+        ("measure_factors", "samples", 1),
     ],
 )  # fmt: skip
 def test_how_much_is_looked_at_is_planned(section, name, value):
     counts = {
         "shadow": {"observations": 400}, "record": {"episodes": 80}, "policy": {"fixtures": 16},
-        "latency": {"warm": 70, "cold": 5, "declared": {}},
+        "latency": {"warm": 70, "cold": 5, "declared": {}}, "measure_baselines": {"samples": 16},
+        "measure_factors": {"samples": 8},
     }  # fmt: skip
     plan = plan_of({**evidence.PARAMS, **counts})
     params = copy.deepcopy({**evidence.PARAMS, **counts})
@@ -139,11 +145,21 @@ def test_how_much_is_looked_at_is_planned(section, name, value):
     assert [(m.place, m.kind) for m in moves(plan, params)] == [(f"{section}.{name}", "loosened")]
 
 
-def test_the_training_is_planned():
+@pytest.mark.parametrize("name", ["updates", "batch_size"])
+def test_the_training_is_planned(name):
     def more(params):
-        params["policy"]["training"] = {"updates": 9}
+        params["policy"]["training"] = {name: 9}
 
-    assert _moved(more) == [("policy.training.updates", "changed")]
+    assert _moved(more) == [(f"policy.training.{name}", "changed")]
+
+
+def test_the_network_and_the_shares_of_demonstrations_are_planned():
+    def other(params):
+        params["policy"]["network"] = {"trunk_width": 8}
+        params["record"] = {"shares": {"nominal": 1.0}}
+
+    moved = _moved(other)
+    assert ("policy.network", "changed") in moved and ("record.shares", "changed") in moved
 
 
 @pytest.mark.parametrize("name", ["train", "validation"])

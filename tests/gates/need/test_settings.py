@@ -60,6 +60,19 @@ def test_a_setting_on_its_border_is_refused_and_one_inside_is_taken(ladder, chan
         settings_of(ladder, "A")
 
 
+def test_a_remedy_is_measured_with_as_many_samples_as_a_candidate_draws(ladder):
+    draws = evidence.PARAMS["stress"]["samples"]
+
+    def measured(samples):
+        evidence.write_params(ladder, lambda p: p["measure_baselines"].update(samples=samples))
+        return settings_of(ladder, "A").samples
+
+    assert measured(draws) == draws
+    with pytest.raises(ConfigError, match=r"measure_baselines\.samples.*as many chances") as told:
+        measured(draws - 1)
+    assert f"{draws - 1} samples cannot show what {draws} draws" in str(told.value)
+
+
 @pytest.mark.parametrize("splits", [["train", "test"], ["train"], ["everything"], []])
 def test_what_trained_is_never_held_out(ladder, splits):
     evidence.write_params(ladder, lambda params: params["gate_a"].update(held_out_splits=splits))

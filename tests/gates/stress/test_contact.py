@@ -25,25 +25,29 @@ def test_who_never_touched_is_said_and_stays_on_the_card_where_force_is_not_judg
     assert untouched(judge(ladder, "D").caveats, "flow") == ""
     evidence.write_params(ladder, _waive_force)
     evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", 0.0, where=_of("flow")))
+    evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", 0.0, where=_of("diffusion")))
     report = judge(ladder, "D")
     many = evidence.STARTS * len(evidence.CONDITIONS)
     said = f"no contact in {many:,} of {many:,} rollouts"
-    assert (untouched(report.caveats, "flow"), untouched(report.caveats, "diffusion")) == (said, "")
+    assert untouched(report.caveats, "flow") == untouched(report.caveats, "diffusion") == said
     assert report.verdict == "PASS", "it is known, and no ground to stop"
     kept = report.model_copy(update={"promoted": "flow"})
     assert any(text.startswith(f"flow: {said}") for text in caveats_of({"D": kept}))
 
 
-def test_who_touched_although_its_force_was_declared_not_to_matter_is_said(ladder):
-    def told():
-        return [text for text in judge(ladder, "D").caveats if "no limit of force" in text]
+def test_force_is_asked_of_who_touched_although_it_was_declared_not_to_matter(ladder):
+    def asked():
+        return [one for one in judge(ladder, "D").criteria if one.id == "force_peak_p95_n"]
 
-    assert told() == []
+    assert [one.verdict for one in asked()] == ["PASS", "PASS"]
     evidence.write_params(ladder, _waive_force)
-    assert [text.partition(":")[0] for text in told()] == ["diffusion", "flow"]
+    report = judge(ladder, "D")
+    assert report.verdict == "INCONCLUSIVE" and report.promoted is None
     evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", 0.0, where=_of("flow")))
-    (text,) = told()
-    assert text.startswith("diffusion: touched something in ") and " N, and no limit" in text
+    (one,) = asked()
+    assert (one.candidate, one.verdict, one.threshold) == ("diffusion", "INCONCLUSIVE", None)
+    assert one.reason.startswith("declared not applicable, but it touched something in ")
+    assert judge(ladder, "D").candidates == {"diffusion": "INCONCLUSIVE", "flow": "PASS"}
 
 
 def test_one_touch_is_a_touch_and_what_is_missing_is_the_matter_of_the_criteria(ladder):

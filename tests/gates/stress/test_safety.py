@@ -47,6 +47,27 @@ def test_recoveries_that_all_failed_stop_the_gate(ladder):
     assert "recovery_success_lower" in {c.id for c in report.criteria if c.verdict == "FAIL"}
 
 
+def test_who_recovered_although_recovery_was_declared_not_to_matter_is_asked(ladder):
+    def waive(params):
+        del params["stress"]["perturbations"]["recovery_drill"]
+        gate = params["gate_d"]
+        (owner,) = (name for name, its in gate["limits"].items() if "recovery_success_lower" in its)
+        del gate["limits"][owner]["recovery_success_lower"]
+        gate["not_applicable"] = {owner: {"recovery_success_lower": "nothing recovers here"}}
+
+    def told():
+        criteria = judge(ladder, "D").criteria
+        return {c.candidate: c.reason for c in criteria if c.id == "recovery_success_lower"}
+
+    evidence.write_params(ladder, waive)
+    evidence.edit_table(ladder, ROLLOUTS, cells("recovery_attempted", False))
+    evidence.edit_table(ladder, ROLLOUTS, cells("recovered", False))
+    assert told() == {}
+    begun(ladder, "nominal", 3, 3)
+    reason = "declared not applicable, but recovery began 3 times"
+    assert told() == {"flow": reason}
+
+
 def test_the_lower_bound_over_the_starts_is_judged(ladder):
     begun(ladder, "recovery_drill", N, 60)
     found = recovery(ladder)
