@@ -304,7 +304,7 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
         return (point, *ends), subset.counted(part)
 
     found = in_every_condition(rows, Subset(ROLLOUTS), settings.perturbations, measure, _newtons)
-    text = f"{found.caveat}; contact on {touched} starts, largest {_newtons(forces.max())}"
+    text = f"{found.caveat}; contact on {seen} starts, largest {_newtons(forces.max())}"
     return replace(found, caveat=text)
 
 
