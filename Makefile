@@ -91,7 +91,7 @@ long: env
 
 # LeRobot needs a newer Python and older libraries than ours: it never shares our environment.
 lerobot:
-	@if ! "$(PYTHON_LEROBOT)" -c '' 2>/dev/null; then \
+	@if ! "$(PYTHON_LEROBOT)" -c 'import sys; sys.exit(not (3, 12) <= sys.version_info < (3, 14))' 2>/dev/null; then \
 	  echo "No Python 3.12 or 3.13 found, which LeRobot needs; skipped. Install one, or name it: make PYTHON_LEROBOT=/path/to/python3.12 lerobot"; \
 	  exit 0; fi; \
 	"$(PYTHON_LEROBOT)" -m venv build/lerobot; \

@@ -123,7 +123,17 @@ def test_git_ignores_the_outputs_by_a_committed_rule() -> None:
         assert (ROOT / name).is_file()
 
 
-@pytest.mark.parametrize("how", ["a path that is none", "one that does not run", "no such program"])
+PYTHONS_OF_LEROBOT = {
+    "a path that is none": None,
+    "one that does not run": "exit 127",
+    # It makes no environment, whatever the Makefile thinks of its version.
+    "an older one": f'[ "$1" = -c ] && exec {sys.executable} -c "import sys; '
+    'sys.version_info = (3, 11, 9); $2"\nexit 9',
+    "no such program": None,
+}
+
+
+@pytest.mark.parametrize("how", PYTHONS_OF_LEROBOT)
 def test_lerobot_s_environment_is_left_out_with_a_sentence_where_its_python_is_not(
     tmp_path: Path, how: str
 ) -> None:
@@ -140,8 +150,8 @@ def test_lerobot_s_environment_is_left_out_with_a_sentence_where_its_python_is_n
         environment["PATH"] = str(tmp_path / "bin")
     else:
         python = tmp_path / "python3.12"
-        if how == "one that does not run":
-            python.write_text("#!/bin/bash\nexit 127\n")
+        if script := PYTHONS_OF_LEROBOT[how]:
+            python.write_text(f"#!/bin/bash\n{script}\n")
             python.chmod(0o755)
         words.append(f"PYTHON_LEROBOT={python}")
     done = subprocess.run(words, capture_output=True, text=True, env=environment, check=False)
