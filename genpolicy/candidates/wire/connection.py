@@ -140,7 +140,9 @@ def _first(socket: ClientConnection, timeout_s: float) -> dict[str, Any]:
 
 def _message(data: str | bytes) -> dict[str, Any]:
     if isinstance(data, str):
-        raise PolicyError(Fault.REFUSED, f"it says {data.strip().splitlines()[-1:]}"[:300])
+        # The last line of a traceback is its reason; quoted, since it is a stranger's text.
+        last = data.strip().rpartition("\n")[2].strip()
+        raise PolicyError(Fault.REFUSED, f"it says {last!r}"[:300] if last else "an empty text")
     try:
         return unpack(data)
     except IntegrityError as error:

@@ -5,6 +5,7 @@ and the number of candidates, and in an answer what was counted. A server that n
 asked plainly, one candidate a message, and what it does not say is unknown.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,6 +23,8 @@ WORD = "genpolicy"
 VERSION = 1
 MOST_CANDIDATES = 64
 MOST_EVALUATIONS = 2**31 - 1
+LONGEST = 80
+"""Characters of a value of the metadata that an error repeats."""
 DIGEST = r"^[0-9a-f]{64}$"
 NoiseName = tuple[str | int, ...]
 
@@ -63,18 +66,36 @@ def capabilities(metadata: dict[str, Any]) -> Capabilities:
     said = metadata.get(WORD)
     if said is None:
         return Capabilities()
+    if not isinstance(said, dict):
+        raise _misstated([], said, "a map of what it can")
+    given = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in said.items()
+    }
     try:
-        lists = {name: tuple(said.get(name, ())) for name in ("spans", "samplers")}
-        told = Capabilities.model_validate({**said, **lists})
-    except (ValidationError, TypeError, AttributeError) as error:
-        raise PolicyError(Fault.MALFORMED, f"its metadata: {str(error).splitlines()[0]}") from error
+        told = Capabilities.model_validate(given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        known = f"one of {', '.join(Capabilities.model_fields)}"
+        rule = first["msg"].replace("tuple", "list")  # as msgpack has it
+        expected = known if first["type"] == "extra_forbidden" else rule
+        raise _misstated(first["loc"], first["input"], expected) from error
     if told.version != VERSION:
-        raise PolicyError(
-            Fault.MALFORMED, f"its metadata speak version {told.version}, known is {VERSION}"
-        )
+        raise _misstated(["version"], told.version, f"{VERSION}, the version that is known here")
     if unknown := sorted(set(told.spans) - {str(term) for term in Term}):
-        raise PolicyError(Fault.MALFORMED, f"its metadata name no latency term: {unknown[0]!r}")
+        raise _misstated(["spans"], unknown[0], f"latency terms: {', '.join(Term)}")
     return told
+
+
+def _misstated(place: Sequence[int | str], found: object, expected: str) -> PolicyError:
+    """A word of the metadata that says something else than it may, with what stands there."""
+    where = ".".join([WORD, *map(str, place)])
+    return PolicyError(
+        Fault.MALFORMED,
+        f"its metadata say {where}: {repr(found)[:LONGEST]}",
+        expected,
+        f"Correct `{where}` where the server writes its metadata; docs/candidates.md says what "
+        "each word means.",
+    )
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,8 @@ class PolicyError(GenpolicyError):
     Args:
         fault: Which kind.
         found: What was seen, for a person.
+        expected: What would have been right; empty for what any process owes here.
+        action: What to do about it, a full sentence; empty for what helps with any such fault.
 
     Attributes:
         expected: What such a process owes.
@@ -67,11 +69,11 @@ class PolicyError(GenpolicyError):
 
     exit_code = 2
 
-    def __init__(self, fault: Fault, found: str) -> None:
+    def __init__(self, fault: Fault, found: str, expected: str = "", action: str = "") -> None:
         self.fault = fault
         self.found = found
-        self.expected = EXPECTED[fault]
-        self.action = ACTION.get(fault, LOOK)
+        self.expected = expected or EXPECTED[fault]
+        self.action = action or ACTION.get(fault, LOOK)
         super().__init__(f"{self.seen}, expected {self.expected}. {self.action}")
 
     @property
@@ -79,6 +81,6 @@ class PolicyError(GenpolicyError):
         """Kind and what was seen, as evidence says it."""
         return f"the policy's process is at fault ({self.fault}): {self.found}"
 
-    def __reduce__(self) -> tuple[type["PolicyError"], tuple[Fault, str]]:
-        """Keep both fields when the error crosses a process boundary."""
-        return type(self), (self.fault, self.found)
+    def __reduce__(self) -> tuple[type["PolicyError"], tuple[Fault, str, str, str]]:
+        """Keep all fields when the error crosses a process boundary."""
+        return type(self), (self.fault, self.found, self.expected, self.action)

@@ -7,7 +7,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import serve
 
 from genpolicy.candidates.wire import connection
-from genpolicy.candidates.wire.connection import Listening, dial, free_port
+from genpolicy.candidates.wire.connection import Listening, _message, dial, free_port
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack
 from genpolicy.errors import ConfigError
@@ -68,6 +68,19 @@ def test_what_the_server_raises_is_told_as_text_and_ends_that_line_only(serving)
             asked(address, {"bad": 1})
         assert error.value.fault is Fault.REFUSED
         assert asked(address) == {}
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("", ": an empty text,"),
+    (" \n", ": an empty text,"),
+    ("Traceback (most recent call last):\n  ...\nValueError: no such phase\n",
+     ": it says 'ValueError: no such phase',"),
+    ("no \x1b[31mphase", r": it says 'no \\x1b\[31mphase',"),
+])  # fmt: skip
+def test_a_text_is_told_by_its_last_line(text, said):
+    with pytest.raises(PolicyError, match=said) as error:
+        _message(text)
+    assert error.value.fault is Fault.REFUSED
 
 
 def test_nobody_there():

@@ -63,6 +63,30 @@ def test_metadata_that_say_something_else_are_malformed(changes):
     assert error.value.fault is Fault.MALFORMED
 
 
+@pytest.mark.parametrize(("changes", "found", "expected"), [
+    ("none of it", "genpolicy: 'none of it'", "a map"),
+    ({"candidates": 0}, "genpolicy.candidates: 0", "greater than or equal to 1"),
+    ({"seeded": "yes"}, "genpolicy.seeded: 'yes'", "valid boolean"),
+    ({"checkpoint": "A" * 64}, f"genpolicy.checkpoint: '{'A' * 64}'", "match pattern"),
+    ({"more": 1}, "genpolicy.more: 1", "one of version, checkpoint, sampler"),
+    ({"spans": ["encoding"]}, "genpolicy.spans: 'encoding'", "latency terms: exposure, capture"),
+    ({"spans": 3}, "genpolicy.spans: 3", "valid list"),
+    ({"spans": "sample"}, "genpolicy.spans: 'sample'", "valid list"),
+    ({"spans": ["sample", 3]}, "genpolicy.spans.1: 3", "valid string"),
+    ({"version": 2}, "genpolicy.version: 2", "1, the version"),
+    ({"sampler": "b" * 10_000}, f"genpolicy.sampler: '{'b' * 79}", "match pattern"),
+])  # fmt: skip
+def test_the_word_that_is_wrong_is_named_with_what_stands_there(changes, found, expected):
+    """Red before: "1 validation error for Capabilities", and no word of which, nor of what."""
+    metadata = said(**changes) if isinstance(changes, dict) else {WORD: changes}
+    with pytest.raises(PolicyError) as error:
+        capabilities(metadata)
+    assert error.value.found == f"its metadata say {found}"
+    assert expected in error.value.expected
+    assert error.value.action.startswith("Correct `genpolicy")
+    assert expected in str(error.value) and "msgpack" not in str(error.value)
+
+
 @pytest.mark.parametrize("metadata", [{WORD: 1}, {WORD: [1]}, {WORD: "yes"}])
 def test_metadata_that_are_no_map_are_malformed(metadata):
     with pytest.raises(PolicyError) as error:

@@ -12,3 +12,5 @@ def test_a_fault_keeps_kind_and_words_across_processes(fault):
     assert error.seen == f"the policy's process is at fault ({fault}): no answer"
     assert str(error) == f"{error.seen}, expected {error.expected}. {error.action}"
     assert error.expected and error.action.endswith(".")
+    told = pickle.loads(pickle.dumps(PolicyError(fault, "0", "one or more", "Write one.")))
+    assert str(told) == f"{told.seen}, expected one or more. Write one."
