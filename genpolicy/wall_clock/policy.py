@@ -18,6 +18,7 @@ from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.judged import loaded_on
 from genpolicy.candidates.wire.policy import WirePolicy, WireSamples
 from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.errors import GenpolicyError
 from genpolicy.policies.protocol import Policy
 from genpolicy.tasks.api import load_task
 from genpolicy.wall_clock.channel import Inbox, frame, send_all
@@ -39,10 +40,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if not (given.address or given.device):
         parser.error("--device of a checkpoint, or --address of a server")
-    if given.address:
-        policy: Policy = _behind_the_wire(given.policy, given.sha256, given.address, given.task)
-    else:
-        policy = loaded_on(given.device, given.policy, sha256=given.sha256)
+    try:
+        policy = _policy(given)
+    except GenpolicyError as error:
+        # Whoever started it sees a process that is gone, as of any other death; a person reads why.
+        print(f"{given.policy} answers nothing by the wall clock: {error}", file=sys.stderr)
+        return error.exit_code
     if given.ready is not None:
         os.write(given.ready, b".")
         os.close(given.ready)
@@ -73,6 +76,17 @@ def answer_of(policy: Policy, ask: Ask, *, candidates: int) -> Answer | None:
         ask.invocation, policy.checkpoint_hash, policy.sampler_config_hash, policy.method,
         drawn.actions[0, 0],
     )  # fmt: skip
+
+
+def _policy(given: argparse.Namespace) -> Policy:
+    """Whoever answers here.
+
+    Raises:
+        GenpolicyError: Its server is not there any more, or what was to be loaded is another one.
+    """
+    if given.address:
+        return _behind_the_wire(given.policy, given.sha256, given.address, given.task)
+    return loaded_on(given.device, given.policy, sha256=given.sha256)
 
 
 def _behind_the_wire(path: Path, sha256: str, address: str, task: str) -> WirePolicy:

@@ -5,13 +5,16 @@ import threading
 from types import SimpleNamespace
 
 import numpy as np
+import yaml
 from arranged import GUARD_S, wait_for
 
+from genpolicy.candidates.wire.connection import free_port
 from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import WireSamples
 from genpolicy.wall_clock.channel import Inbox, Outbox
 from genpolicy.wall_clock.messages import Ask, read_answer
 from genpolicy.wall_clock.policy import answer_of, main
+from tests.candidates.conftest import ENTRY
 
 
 def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
@@ -38,6 +41,18 @@ def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
     outbox.close()
     serving.join(GUARD_S)
     assert not serving.is_alive()
+
+
+def test_a_server_that_is_gone_before_it_is_asked_is_one_sentence(tmp_path, capsys):
+    """Red before: a traceback. Whoever started it sees that the process is gone, as ever."""
+    entry = tmp_path / "candidate.yaml"
+    entry.write_text(yaml.safe_dump(ENTRY))
+    address = f"ws://127.0.0.1:{free_port()}"
+    words = ["--address", address, "--task", "tabletop_insertion", "--asks", "0", "--answers", "1"]
+    assert main([str(entry), "c" * 64, *words]) == 2
+    [said] = capsys.readouterr().err.splitlines()
+    assert said.startswith(f"{entry} answers nothing by the wall clock: the policy's process is at")
+    assert f"nobody answers at {address}" in said
 
 
 def test_an_invocation_whose_process_failed_is_no_answer(data):
