@@ -3,8 +3,9 @@
 LeRobot's client executes the front of its queue at every tick, whatever its age, and asks again
 when half of the queue is left; what comes is put in by the number of the step, mixed with what
 waits there (`weighted_average`: .7 of the new one) or in its place (`latest_only`). Ours executes
-nothing older than `execution.maximum_age_s`, and stands instead. Both meet the same starts and the
-same latencies, drawn by the same names: one invocation in ten takes as long as `TAIL_S`.
+nothing older than `execution.maximum_age_s`, and stands instead: what it discards is counted by
+reason beside what they execute. Both meet the same starts and the same latencies, drawn by the same
+names: one invocation in ten takes as long as `TAIL_S`.
 
 With `--python` LeRobot's own client and server say what is executed (`adapters/lerobot_async.py`);
 without it `Theirs` does, which a test holds against a recording of them.
@@ -17,7 +18,9 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,6 +36,7 @@ from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel, draw_l
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.state import Setup
 from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.journal import Event
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
@@ -172,10 +176,37 @@ class Absent:
         return SimpleNamespace(nfe=1)
 
 
-def ours() -> tuple[list[float], list[int]]:
-    """Ages, s, of what our executor let by in each start, and how many ticks each took."""
+@dataclass(frozen=True)
+class Ours:
+    """What our executor did with the actions of all starts.
+
+    Attributes:
+        ages_s: How old each action was that it let by, s.
+        ticks: Of each start.
+        generated: Actions of all chunks that arrived.
+        ended: What became of those that were not executed, by reason.
+    """
+
+    ages_s: list[float]
+    ticks: list[int]
+    generated: int
+    ended: Counter[str]
+
+
+def ended_otherwise(events: Iterable[Event]) -> Counter[str]:
+    """Actions of chunks that are over and were not executed, by the reason in the journal."""
+    counts: Counter[str] = Counter()
+    for event in events:
+        if event.kind in ("discard", "finish"):
+            counts.update(event.payload["rows"])
+    del counts["executed"]
+    return counts
+
+
+def ours(rollouts: int = ROLLOUTS) -> Ours:
+    """Our executor on the first starts, to the end of each."""
     task = load_task(PARAMS["task"]["name"])
-    specs = task.episode_specs(3, ROLLOUTS, shares={"nominal": 1.0})
+    specs = task.episode_specs(3, rollouts, shares={"nominal": 1.0})
     plans = {number: demonstrate(spec).actions for number, spec in enumerate(specs)}
     setup = Setup(
         task=task, checker=make_checker(
@@ -187,14 +218,14 @@ def ours() -> tuple[list[float], list[int]]:
         method="bench", checkpoint="w", sampler="s",
     )  # fmt: skip
     absent: Any = Absent()
-    _, rollouts = closed_loop(Rehearsed(absent, plans), setup, [spec.start for spec in specs])
-    ages = [
-        event.payload["age_ns"] / 1e9
-        for rollout in rollouts
-        for event in rollout.journal.events()
-        if event.kind == "accept"
-    ]
-    return ages, [rollout.tick for rollout in rollouts]
+    _, run = closed_loop(Rehearsed(absent, plans), setup, [spec.start for spec in specs])
+    events = [event for rollout in run for event in rollout.journal.events()]
+    return Ours(
+        [event.payload["age_ns"] / 1e9 for event in events if event.kind == "accept"],
+        [rollout.tick for rollout in run],
+        sum(rollout.executor.conservation().actions.generated for rollout in run),
+        ended_otherwise(events),
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -202,18 +233,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.async_client")
     parser.add_argument("--python", type=Path, help="that has LeRobot: its own code is asked")
     python = parser.parse_args(argv).python
-    mine, ticks = ours()
+    mine = ours()
+    ticks = mine.ticks
     rows = {f"LeRobot, {rule}": ages_s(as_lerobot(asked_of(rule, ticks), python)) for rule in RULES}
     limit_s = max(ExecutionSettings(**PARAMS["execution"]).maximum_age_s.values())
     print(f"{ROLLOUTS} starts, {sum(ticks)} ticks; an action may be {limit_s:g} s old")
     print(f"LeRobot's queue by {'its own code' if python else 'our words for it'}")
     print("rule                       executed  too old   share  oldest s  stood")
-    for name, ages in {**rows, "genpolicy": mine}.items():
+    for name, ages in {**rows, "genpolicy": mine.ages_s}.items():
         old = sum(age > limit_s + 1e-9 for age in ages)
         print(
             f"{name:26s} {len(ages):8d} {old:8d} {old / len(ages):7.1%} {max(ages):9.2f} "
             f"{sum(ticks) - len(ages):6d}"
         )
+    print(f"genpolicy, of {mine.generated} actions that came:")
+    for reason, count in mine.ended.most_common():
+        print(f"  {reason:26s} {count:6d} {count / mine.generated:7.1%}")
+    left = mine.generated - len(mine.ages_s) - mine.ended.total()
+    print(f"  {'executed':26s} {len(mine.ages_s):6d} {len(mine.ages_s) / mine.generated:7.1%}")
+    print(f"  {'in the queue at the end':26s} {left:6d} {left / mine.generated:7.1%}")
     return 0
 
 

@@ -7,10 +7,11 @@ similar), and latencies from below a tick to longer than a chunk.
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from benchmarks.async_client import ages_s, as_lerobot
+from benchmarks.async_client import ages_s, as_lerobot, ended_otherwise, ours
 
 RECORDED = json.loads((Path(__file__).parent / "recorded" / "lerobot_async.json").read_text())
 
@@ -29,3 +30,25 @@ def test_the_recording_holds_what_the_count_is_about():
     every = [run for one in RECORDED for run in one["executed"]]
     assert max(ages_s(every)) > 0.9
     assert any(seen is None for run in every for seen in run[20:])
+
+
+def test_what_ours_does_not_execute_is_counted_by_reason():
+    events = [
+        SimpleNamespace(kind=kind, payload={"rows": rows})
+        for kind, rows in (
+            ("discard", {"executed": 2, "late": 1, "expired": 13}),
+            ("finish", {"executed": 8, "beyond_execution_horizon": 8}),
+            ("discard", {"executed": 0, "expired": 16}),
+            ("accept", {"executed": 1}),
+        )
+    ]
+    assert ended_otherwise(events) == {
+        "expired": 29, "beyond_execution_horizon": 8, "late": 1,
+    }  # fmt: skip
+
+
+def test_each_action_that_came_was_executed_or_has_a_reason():
+    found = ours(1)
+    left = found.generated - len(found.ages_s) - found.ended.total()
+    assert 0 <= left < 16  # of the chunk that was in the queue at the end
+    assert found.ended["expired"] > 0 and found.ages_s
