@@ -10,7 +10,7 @@ from genpolicy.candidates.conformance.asked import Asked
 from genpolicy.candidates.conformance.finding import ONE_IN_TWO, Finding, Judged
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.wire.extension import Capabilities
-from genpolicy.contract.latency import Term
+from genpolicy.candidates.wire.spans import EXPECTED_TERMS, of_others_s
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
 
 Array = NDArray[np.float64]
@@ -22,7 +22,6 @@ CLOCKS_APART = 1e-3
 MESSAGE_S = 0.01
 """What reading and writing a message may take beside the terms, a busy machine allowed for:
 `serve-policy` takes 1 to 3 ms."""
-SAMPLER_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
 
 
 def answers(asked: Asked, moments: int) -> Finding:
@@ -153,7 +152,7 @@ def spans(told: Capabilities, asked: Asked, wire: list[float]) -> Finding:
         asked: Its answers.
         wire: Round trips of a ping, s; empty where none was answered.
     """
-    missing = [str(term) for term in SAMPLER_TERMS if term not in told.spans]
+    missing = [str(term) for term in EXPECTED_TERMS if term not in told.spans]
     if missing:
         said = f"it does not measure {', '.join(missing)}: unknown, not zero"
         return Finding("spans", "unknown", "C", said)
@@ -175,13 +174,25 @@ def spans(told: Capabilities, asked: Asked, wire: list[float]) -> Finding:
     low, _ = order_statistic_interval(besides - claimed, ONE_IN_TWO)
     said = (
         f"it measures {', '.join(told.spans)}: {1e3 * float(np.median(claimed)):.3g} of "
-        f"{1e3 * float(np.median(lasted)):.3g} ms; {_wire(wire)}"
+        f"{1e3 * float(np.median(lasted)):.3g} ms; {_wire(wire)}{_of_others(asked)}"
     )
     if low <= 0.0:
         return Finding("spans", "holds", "C", said)
     # Without a ping it may be the wire that takes so long.
     judged: Judged = "fails" if wire else "unknown"
     return Finding("spans", judged, "C", f"{said}; most of the time is in none of them")
+
+
+def _of_others(asked: Asked) -> str:
+    """What the ladder does with terms that are not the model's."""
+    each = [of_others_s(one.spans_s) for one in asked.answers.values()]
+    if not each[0]:
+        return ""
+    took_s = float(np.median([sum(one.values()) for one in each]))
+    return (
+        f"; of it {', '.join(each[0])} {1e3 * took_s:.3g} ms, which the ladder counts as sample: "
+        "its own of that name are the cell's, and come on top"
+    )
 
 
 def _wire(wire: list[float]) -> str:

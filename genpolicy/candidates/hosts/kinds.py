@@ -198,6 +198,12 @@ class ScriptedEntry(DrawingEntry):
     kind: Literal["scripted"]
     function: str = Field(pattern=FUNCTION)
 
+    @model_validator(mode="after")
+    def _as_it_is(self) -> "ScriptedEntry":
+        if self.samplers:
+            raise ValueError("samplers: a function has no settings to ask for; bring another one")
+        return self
+
     @property
     def file(self) -> str:
         """Where the function stands."""
@@ -220,6 +226,15 @@ class LeRobotEntry(Entry):
     kind: Literal["lerobot"]
     pretrained_model: str = Field(min_length=1)
     interpreter: str = "build/lerobot/bin/python"
+
+    @model_validator(mode="after")
+    def _as_it_was_saved(self) -> "LeRobotEntry":
+        if self.samplers:
+            raise ValueError(
+                "samplers: a policy of LeRobot is asked as its config.json says; bring another "
+                "folder"
+            )
+        return self
 
     def essential(self, folder: Path) -> list[str]:
         """Config and weights, and whatever else of it LeRobot reads."""

@@ -23,6 +23,7 @@ from genpolicy.candidates.wire.extension import Capabilities, GoesOn
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
+from genpolicy.candidates.wire.spans import terms_of
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import Term
@@ -37,8 +38,6 @@ GONE_AFTER = 8
 """Faults in a row after which it is asked no more: each may cost a whole timeout."""
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """By which a process is told how many threads its arithmetic has."""
-OWN_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
-"""What happens in its process."""
 
 
 @dataclass(frozen=True)
@@ -166,20 +165,16 @@ class WirePolicy:
     ) -> tuple[dict[Term, float], Array]:  # fmt: skip
         """One invocation with what its terms took, s, and its chunks (N, K, D_a).
 
-        Whatever no span of its server explains is counted as sampling: the message itself, and all
-        of a server that measures nothing. A term that nobody measured is NaN: unknown, not zero.
-        An invocation that ends in a fault took as long as it was waited for.
+        Whatever no span of the model explains is counted as sampling: the message itself, and all
+        of a server that measures nothing (`wire.spans`). A term that nobody measured is NaN:
+        unknown, not zero. An invocation that ends in a fault took as long as it was waited for.
         """
         begun = self._clock()
         given = self._given(prefix, 0)
         answer = self.invoke(observations, noise=noise, candidates=candidates, prefix=given)
         if isinstance(answer, Fault):
-            waited = {**dict.fromkeys(OWN_TERMS, np.nan), Term.SAMPLE: self._clock() - begun}
-            return waited, self._chunks(answer, candidates)
-        spans = {term: answer.spans_s.get(str(term), np.nan) for term in OWN_TERMS}
-        rest_s = answer.seconds - sum(answer.spans_s.get(str(term), 0.0) for term in OWN_TERMS)
-        known_s = 0.0 if np.isnan(spans[Term.SAMPLE]) else spans[Term.SAMPLE]
-        return {**spans, Term.SAMPLE: known_s + max(0.0, rest_s)}, self._chunks(answer, candidates)
+            return terms_of({}, self._clock() - begun), self._chunks(answer, candidates)
+        return terms_of(answer.spans_s, answer.seconds), self._chunks(answer, candidates)
 
     def invoke(
         self, observations: Array, *, noise: NoiseName, candidates: int,

@@ -220,7 +220,10 @@ class _Asked:
 
 
 class _Clock:
-    """Spans of one invocation; of a run queue, where it is given, what was waited in it."""
+    """Spans of one invocation; of a run queue, where it is given, what was waited in it.
+
+    A span of a term that has one already adds to it: a server behind the wire may select, too.
+    """
 
     def __init__(self, queue: RunQueue | None = None) -> None:
         self._queue = queue or RunQueue(None)
@@ -234,7 +237,11 @@ class _Clock:
         yield
         after = self._queue.now()
         seconds = time.perf_counter() - start
-        self.spans[str(term)] = Span(seconds, waited_s(before, after, wall_s=seconds))
+        waited = waited_s(before, after, wall_s=seconds)
+        earlier = self.spans.get(str(term), Span(0.0, 0.0))
+        if waited is not None:
+            waited = None if earlier.waited_s is None else earlier.waited_s + waited
+        self.spans[str(term)] = Span(earlier.seconds + seconds, waited)
 
 
 def _spans(

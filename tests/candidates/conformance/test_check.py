@@ -446,6 +446,26 @@ def test_what_a_server_says_of_its_time_stands_beside_what_it_took(checked, star
     assert boasts.endswith("6e+04 of 3 ms")
 
 
+class StatesMore(Honest):
+    """Measures a term that is not of the model, too."""
+
+    def __init__(self, starts):
+        super().__init__(starts)
+        spans = {"preprocess": 1e-4, "encode": 1e-4, "sample": 7e-4, "network": 2e-3}
+        self.metadata[WORD]["spans"] = [*spans]
+        self.said = {"spans_s": spans}
+
+
+def test_what_it_states_of_others_terms_is_said_to_count_as_sampling(checked, starts):
+    """As the ladder counts it: see `genpolicy.candidates.wire.spans`."""
+    found = checked(StatesMore(starts))
+    said = said_of(found, "spans")
+    assert "2.9 of 3 ms" in said
+    assert "of it network 2 ms, which the ladder counts as sample" in said
+    assert judged(found)["spans"] == "holds"
+    assert "counts as sample" not in said_of(checked(Honest(starts)), "spans")
+
+
 def test_without_a_ping_the_wire_may_be_what_takes_so_long(checked, starts, monkeypatch):
     monkeypatch.setattr(RemotePolicy, "round_trip_s", lambda _: None)
     found = checked(Flatters(starts))

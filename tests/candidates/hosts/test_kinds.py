@@ -1,3 +1,4 @@
+import datetime
 import re
 import shutil
 from pathlib import Path
@@ -6,6 +7,9 @@ import pytest
 import torch
 import yaml
 
+from benchmarks.candidates import SAMPLER
+from gates.exceptions import require_unmatched, unmatched_written, utc_today
+from gates.floors import LONGEST_DAYS
 from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.hosts import onnx_library
 from genpolicy.candidates.hosts.kinds import KINDS, chosen, read_entry
@@ -26,6 +30,7 @@ DECLARED = {
 }  # fmt: skip
 
 ALONE = {**DECLARED, "threads": 1}
+ANOTHER = {"two_steps": {"sampler": "euler", "sampler_steps": 2}}
 OBSERVED = ENTRY["observation"]["observation"]
 
 
@@ -89,6 +94,9 @@ def test_an_unknown_kind_names_the_known_ones(written):
         ("scripted", {"function": "os.path:join"}, "pattern"),
         ("torch", {"address": "ws://127.0.0.1:1"}, "fields of a candidate"),
         ("torch", {"noise": {**NOISE, "stream": "12"}}, "pattern"),
+        ("torch", {"samplers": ANOTHER}, "samplers: a program is written out with one"),
+        ("scripted", {"samplers": ANOTHER}, "samplers: a function has no settings"),
+        ("lerobot", {"samplers": ANOTHER}, "samplers: a policy of LeRobot is asked as its"),
     ],
 )
 def test_what_is_wrong_is_named(written, kind, changes, expected):
@@ -183,6 +191,24 @@ def test_every_block_of_the_docs_is_looked_at():
         "candidate.yaml", "joints", "trained.yaml", "torch.yaml", "scripted.yaml", OF_THE_LADDER,
         "declared", "samplers", "lerobot.yaml",
     }  # fmt: skip
+
+
+def test_the_docs_name_the_policy_of_which_the_table_of_kinds_is():
+    [said] = re.findall(r"`python -m benchmarks\.candidates`, (medians .*)", DOCS)
+    assert f"untrained diffusion of the configured size, {SAMPLER.steps} DDIM steps" in said
+    assert SAMPLER.name == "ddim"
+
+
+@pytest.mark.parametrize("today", [utc_today(), datetime.date(2099, 12, 1)])
+def test_the_exception_of_the_docs_holds_on_whatever_day_it_is_read(today):
+    """No day stands there that is over some day: who copies it is asked for one of his own."""
+    [block] = [one for one in BLOCKS if named(one) == OF_THE_LADDER]
+    section = yaml.safe_load(block)["gate_b"]
+    with pytest.raises(ConfigError, match=r"gate_b\.unmatched\.my_flow.*@day@"):
+        unmatched_written({"gate_b": section})
+    last = str(today + datetime.timedelta(days=LONGEST_DAYS))
+    written = unmatched_written(yaml.safe_load(block.replace("@day@", last)))
+    require_unmatched(written, today, brought={"my_flow"})
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=named)

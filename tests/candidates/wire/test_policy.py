@@ -12,7 +12,7 @@ from genpolicy.candidates.wire.extension import WORD, Capabilities
 from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import GONE_AFTER, WirePolicy, running
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.contract.latency import Term
+from genpolicy.contract.latency import MEASURED_TERMS, OWNERS, Owner, Term
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.policies.prefix import Prefix
 from tests.candidates.conftest import ENTRY
@@ -168,6 +168,23 @@ def test_time_that_no_span_explains_is_of_the_sampler(wire, task):
     assert np.isnan([terms[Term.PREPROCESS], terms[Term.ENCODE]]).all()
     # The server says .5 s; by the clock here it took 2 s from first byte to last chunk.
     assert terms[Term.SAMPLE] == 2.0
+
+
+@pytest.mark.parametrize("term", Term)
+def test_time_of_an_answer_is_counted_once_whatever_its_server_states(wire, task, term):
+    """Of the model's terms each is its own; what is of others comes on top by both clocks."""
+    ticks = iter(np.arange(0.0, 100.0, 2.0))
+    planted = Planted(spans=[*dict.fromkeys(["preprocess", "encode", "sample", term])])
+    planted.changes = {"spans_s": {**dict.fromkeys(planted.can["spans"], 0.125), term: 0.5}}
+    policy = wire(planted, clock=lambda: next(ticks))
+    terms, _ = policy.timed(seen(1, task)[0], noise=("a",), candidates=1)
+    assert sum(terms.values()) == 2.0
+    assert set(terms) <= set(MEASURED_TERMS)  # of the others the cell has its own
+    if OWNERS[term] is Owner.MODEL and term is not Term.SAMPLE:
+        assert terms[term] == 0.5
+    else:
+        assert set(terms) == {Term.PREPROCESS, Term.ENCODE, Term.SAMPLE}
+        assert terms[Term.SAMPLE] == 1.75
 
 
 def test_a_server_that_measures_nothing_is_all_sampling(wire, task):

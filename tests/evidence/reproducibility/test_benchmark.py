@@ -1,11 +1,18 @@
 """The latency benchmark on a tiny policy, and fresh processes."""
 
+import numpy as np
 import pytest
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.joining import JoiningSettings
-from genpolicy.evidence.reproducibility.benchmark import measure_policy
+from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.wire.policy import WirePolicy
+from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.evidence.reproducibility.benchmark import invoke, measure_policy
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.policy import NetworkPolicy
+from tests.candidates.conftest import entry_of, serving  # noqa: F401
+from tests.candidates.wire.test_remote import Planted
 
 METHODS = ("bc", "flow")
 
@@ -92,3 +99,29 @@ def test_as_many_candidates_are_drawn_as_are_deployed(fleet, observations, monke
         warm_repeats=2, discarded_repeats=1, candidates=4,
     )  # fmt: skip
     assert asked == [4] * 4
+
+
+class SelectsToo(Planted):
+    """Chooses among chunks of its own, a second long by what it states."""
+
+    def __init__(self):
+        super().__init__(spans=["preprocess", "encode", "sample", "select"])
+        self.changes = {"spans_s": {**dict.fromkeys(self.can["spans"], 0.0), "select": 1.0}}
+
+
+def test_what_a_server_takes_to_select_is_added_to_what_it_takes_here(
+    serving, entry_of, task, tmp_path  # noqa: F811
+):  # fmt: skip
+    """Red before: it was in `sample`, and of two spans of one term the later one counted."""
+    planted, entry = SelectsToo(), entry_of()
+    with serving(planted, {WORD: planted.can}) as address:
+        remote = RemotePolicy(entry, address, task.observation)
+        brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+        policy = WirePolicy(brought, remote)
+        terms = invoke(
+            policy, np.zeros((1, 2, task.observation.dim)), repeat=0, candidates=1, project=None
+        )
+        remote.close()
+    assert set(terms) == {"preprocess", "encode", "sample", "select"}
+    assert terms["select"] > 1.0
+    assert terms["sample"] >= 0.0
