@@ -188,9 +188,9 @@ def _of_others(asked: Asked) -> str:
     each = [of_others_s(one.spans_s) for one in asked.answers.values()]
     if not each[0]:
         return ""
-    took_s = float(np.median([sum(one.values()) for one in each]))
+    stated_s = float(np.median([sum(one.values()) for one in each]))
     return (
-        f"; of it {', '.join(each[0])} {1e3 * took_s:.3g} ms, which the ladder counts as sample: "
+        f"; of it {', '.join(each[0])} {1e3 * stated_s:.3g} ms, which the ladder counts as sample: "
         "its own of that name are the cell's, and come on top"
     )
 

@@ -26,6 +26,8 @@ from websockets.sync.server import ServerConnection, serve
 from genpolicy.candidates.wire.packing import pack
 
 RECORDED = Path(__file__).parent / "recorded" / "openpi_client.msgpack"
+PACKAGE = "openpi_client"
+"""Needed to record, and by nothing else here: no environment of ours has it."""
 METADATA: dict[str, Any] = {"reset_pose": [0.0, -0.5], "action_horizon": 16}
 PROMPT = "insert the peg"
 ROWS = 16
@@ -45,7 +47,7 @@ def answer() -> dict[str, Any]:
     actions = np.zeros((ROWS, 10), dtype=np.float32)
     actions[:, :3] = np.linspace(0.1, 0.3, 3 * ROWS).reshape(ROWS, 3)
     actions[:, [3, 7]] = 1.0
-    return {"actions": actions, "server_timing": {"infer_ms": np.float64(12.5)}}
+    return {"actions": actions, "server_timing": {"infer_ms": np.float32(12.5)}}
 
 
 @contextmanager
@@ -61,8 +63,8 @@ def raw_server(talk: Callable[[ServerConnection], None]) -> Iterator[str]:
 
 def main() -> None:
     """Ask by openpi's client, once in its own packing and once a server that packs as ours."""
-    packing = importlib.import_module("openpi_client.msgpack_numpy")
-    client = importlib.import_module("openpi_client.websocket_client_policy")
+    packing = importlib.import_module(f"{PACKAGE}.msgpack_numpy")
+    client = importlib.import_module(f"{PACKAGE}.websocket_client_policy")
     kept: dict[str, Any] = {"version": version("openpi-client")}
     for name, packed in (("theirs", packing.packb), ("ours", pack)):
         said, answered = packed(METADATA), packed(answer())
