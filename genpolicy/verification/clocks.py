@@ -8,8 +8,8 @@ from typing import Any
 
 from genpolicy.verification.journal_source import Message, read_messages
 
-GAVE_WAY = ("reset", "superseded")
-"""Reasons by which the rest of a chunk ends because another one begins."""
+GAVE_WAY = "superseded"
+"""Reason by which the rest of a chunk ends because another one takes over; a reset is none."""
 NS_PER_S = 1e9
 
 
@@ -98,7 +98,7 @@ class _Window:
         if m["ended"] == "discarded":
             of.discarded_by = reason
         else:
-            of.replaced = reason in GAVE_WAY
+            of.replaced = reason == GAVE_WAY
 
     def tell(self, found: Windows, *, clock: str, deadline_ns: int) -> None:
         """Add the rows of this window."""

@@ -2,8 +2,9 @@
 
 Nothing is decided here. Executor, controller stub and supervisor are those of every rollout and
 shadow session, with the whole table of checks; this passes on to them what was recorded, what a
-policy answered and what a person wants. Nothing moves: before each invocation the session is reset
-to where the recorded arm is, which clears no stop.
+policy answered and what a person wants. Nothing moves: the arm is seen where the stub's commands
+lead (`following`), so that a chunk runs on while the policy answers and the next one takes over.
+Where a task's arm cannot be followed, each invocation begins with a reset, which clears no stop.
 """
 
 import math
@@ -30,6 +31,7 @@ from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.tasks.api import Task
 from genpolicy.wall_clock.admission import Job, Result
+from genpolicy.wall_clock.following import arm_of
 from genpolicy.wall_clock.messages import Answer, Ask, Operator, Order
 from genpolicy.wall_clock.replay import Replay
 from genpolicy.wall_clock.request import WallClockRequest
@@ -48,12 +50,16 @@ class Asked:
         row: Row of the replay that it was asked at.
         asked_s: When, s.
         answered_s: When the answer came, s; None before.
+        admitted: The chunk, where it passed; it is delivered when its first row is the next.
+        first_row: Row of the replay that its first checked action is for.
     """
 
     metadata: ChunkMetadata
     row: int
     asked_s: float
     answered_s: float | None = None
+    admitted: Admitted | None = None
+    first_row: int = 0
 
 
 @dataclass
@@ -85,6 +91,7 @@ class SupervisedSession:
         ended: A person wants the end.
         tally: What is counted.
         replay: What is replayed.
+        arm: Where the arm is that is observed.
     """
 
     def __init__(
@@ -99,6 +106,7 @@ class SupervisedSession:
         self.journal, self.cell, self.tally, self.ended = journal, cell, Tally(), False
         self._task, self._request = task, request
         self.replay: Replay = request.replay
+        self.arm = arm_of(task, request.replay, horizon=cell.horizons.execution_horizon)
         self.stub = ControllerStub(cell, journal, Supervisor(cell.execution, journal))
         self.executor = Executor(cell, journal, self.stub)
         self.executor.set_active(0.0, request.checkpoint, request.sampler)
@@ -106,8 +114,8 @@ class SupervisedSession:
         if stop_stands:  # one that takes over in a session that runs begins stopped
             self.stub.supervisor = Supervisor(cell.execution, journal)
         self._asked: Asked | None = None
-        self._row = 0
-        self._asks = 0
+        self._row = self._asks = 0
+        self._seen = (0, 0.0)
 
     def tick(self, now_s: float, row: int) -> Ask | None:
         """One control period: what was recorded at a row is seen now, and a command is decided.
@@ -120,12 +128,16 @@ class SupervisedSession:
             What the policy is asked next, if anything.
         """
         self._row, replay, executor = row, self.replay, self.executor
+        self.arm.reach(row)
         phase = replay.phases[row]
         executor.observe(now_s, now_s, phase, replay.calibration_epoch)
         if self.stub.supervisor.observe_force(now_s, replay.forces_n[row], phase):
             executor.force_event(now_s)
         self._see(now_s, row)
-        executor.tick(now_s)
+        if not self.journal.doubt:
+            self._seen = row, now_s
+        self.arm.given(row, executor.tick(now_s))
+        self._deliver(now_s)
         asked = self._asked
         if asked is not None and self._overdue(asked, now_s):
             self._give_up(asked, now_s)
@@ -137,13 +149,13 @@ class SupervisedSession:
         """Say where bodies are seen; where the task cannot tell, nobody knows, and that holds."""
         poses: Mapping[str, tuple[ArrayLike, ArrayLike]] = UNKNOWN
         with suppress(Exception):  # whatever a task raises, the tick goes on to what stops
-            poses = self._task.scene_poses(self.replay.observation_rows[row])
+            poses = self._task.scene_poses(self.arm.at(row))
         self.executor.see(now_s, poses)
 
     def _ask(self, now_s: float, row: int) -> Ask:
         executor, replay, horizons = self.executor, self.replay, self.cell.horizons
         phase, start_s = replay.phases[row], row * horizons.action_period_s
-        if self._asks:  # the arm is where the operator brought it, not where the last chunk ended
+        if self._asks and not self.arm.follows:  # it is where the operator brought it
             executor.reset(now_s)
             executor.observe(now_s, now_s, phase, replay.calibration_epoch)
         metadata = ChunkMetadata(
@@ -166,7 +178,7 @@ class SupervisedSession:
         self._asked = Asked(metadata, row, now_s)
         return Ask(
             metadata.chunk_id,
-            replay.history(row, horizons.observation_horizon),
+            self.arm.history(row, horizons.observation_horizon),
             (replay.episode_uuid, str(row)),
         )
 
@@ -199,20 +211,21 @@ class SupervisedSession:
             sampler_config_hash=answer.sampler, method=answer.method,
         )  # fmt: skip
         self.executor.end_invocation(now_s, asked.metadata.chunk_id, "answered")
-        replay, row = self.replay, asked.row
-        late_rows = self._next_row(now_s, judging_s) - row
+        asked.first_row = self._next_row(now_s, judging_s)
+        late_rows = asked.first_row - asked.row
         if late_rows >= self.cell.horizons.execution_horizon:
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
+        row, seen_s = self._seen if self.arm.follows else (asked.row, asked.asked_s)
         taken = submit(
             Job(
                 proposal=propose([Candidate(asked.metadata, answer.actions)]),
-                history=replay.history(row, min(row + 1, 2)),
-                commanded=replay.commanded(row),
+                history=self.arm.history(row, min(row + 1, 2)),
+                commanded=self.arm.commanded(asked.row, asked.first_row),
                 session=self._in_force(),
-                event_s=asked.asked_s,
+                event_s=seen_s,
                 now_s=now_s,
-                phase=replay.phases[row],
+                phase=self.replay.phases[row],
                 late_rows=late_rows,
             )
         )
@@ -236,8 +249,8 @@ class SupervisedSession:
                 first_reason=verdict.first_reason or None,
             )
         if isinstance(result, Admitted):
-            self._asked = None
-            self.executor.deliver(result, now_s)
+            asked.admitted = result
+            self._deliver(now_s)
         else:
             self._write_off(asked, _reason(result), now_s)
         assert asked.answered_s is not None, "what is decided was answered"
@@ -268,6 +281,21 @@ class SupervisedSession:
         if self._asked is not None:
             self._give_up(self._asked, now_s)
         return self.executor.end_episode(now_s)
+
+    def _deliver(self, now_s: float) -> None:
+        """What was admitted takes over at the very row that it was judged for, or never.
+
+        Sooner the rows of the chunk before would be lost, and later nobody checked the way.
+        """
+        asked = self._asked
+        if asked is None or asked.admitted is None or asked.first_row > self._row + 1:
+            return
+        if asked.first_row <= self._row:
+            self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="late_verdict")
+            return
+        self._asked = None
+        if self.executor.deliver(asked.admitted, now_s) is None:
+            self.arm.runs(asked.admitted)
 
     def _overdue(self, asked: Asked, now_s: float) -> bool:
         """Whether its deadline is over, in whole periods: a tick is late by less than one."""

@@ -44,7 +44,7 @@ def test_an_invocation_that_missed_its_deadline_and_one_that_gave_way(told):
         gone("a", 150_000_000, "discarded", "expired"),
         begin("b", 200_000_000), end("b", 210_000_000, "answered"),
         ("accept", 250_000_000, {"chunk_id": "b", "row": 1, "age_ns": 50_000_000}),
-        gone("b", 300_000_000, "executed", "reset"),
+        gone("b", 300_000_000, "executed", "superseded"),
         begin("c", 300_000_000),
         ("end", 350_000_000, {}),
     )  # fmt: skip
@@ -58,6 +58,12 @@ def test_an_invocation_that_missed_its_deadline_and_one_that_gave_way(told):
                "replaced": False},
     ]  # fmt: skip
     assert found.ages == [key | {"invocation": 1, "row": 1, "age_s": 0.05}]
+
+
+@pytest.mark.parametrize("reason", ["reset", "stopped", "stale_observation", "end_of_episode"])
+def test_a_rest_that_ends_before_another_chunk_is_there_is_not_replaced(reason, told):
+    (row,) = told(begin("a", 0), gone("a", 1, "executed", reason), ("end", 1, {})).invocations
+    assert (row["discarded_by"], row["replaced"]) == ("", False)
 
 
 def test_an_invocation_counts_if_its_deadline_and_a_tick_lie_within_the_window(told):

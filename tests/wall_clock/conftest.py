@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from arranged import still_replay, workspace
 from together import beginning
+from told import begin
 
 from genpolicy.tasks.api import load_task
 
@@ -29,3 +30,9 @@ def pinned(tmp_path_factory):
 def sessions(request, pinned, standing, tmp_path_factory):
     """What runs of the tests that are marked `together`."""
     yield from beginning(request, pinned, standing, tmp_path_factory)
+
+
+@pytest.fixture
+def told(kit, task, checker, standing, tmp_path):
+    """A session on an arm that stands; nobody has asked anything."""
+    return begin(kit, task, checker, standing, tmp_path)

@@ -73,6 +73,25 @@ def test_a_trained_policy_by_both_clocks(shared, fleet, tmp_path):
     assert {(row["ticks"], row["late_max_s"]) for row in exact} == {(ROWS, 0.0)}
     ages = [row["age_s"] / PERIOD_S for row in found["ages"] if row["clock"] == "virtual"]
     assert np.allclose(ages, np.rint(ages))
+    wall, virtual = (seen(tmp_path / f"journals/flow__{c}.mcap") for c in ("wall", "virtual"))
+    assert len(virtual) == 2 * ROWS and wall.items() <= virtual.items()  # a late tick may miss one
+    assert len(wall) > ROWS
+    kinds = {e.kind for path in (tmp_path / "journals").iterdir()
+             for events in read_journal(path).values() for e in events}  # fmt: skip
+    assert "reset" not in kinds
+
+
+def seen(journal):
+    """By session and row of its window: where bodies were seen, and in which phase."""
+    found = {}
+    for name, events in read_journal(journal).items():
+        for event in events:
+            at = found.setdefault((name.split("/")[-1], int(event.t / 1e9 / PERIOD_S + 0.01)), {})
+            if event.kind == "scene":
+                at["bodies"] = event.payload["bodies"]
+            elif event.kind == "observation":
+                at["phase"] = event.payload["phase"]
+    return {place: at for place, at in found.items() if at}
 
 
 def test_the_virtual_clock_is_one_journal_for_one_seed(shared, policy, tmp_path):

@@ -4,72 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from arranged import request_of
+from told import begin
 
-from genpolicy.execution.cell import Cell
-from genpolicy.verification.checker import check_messages
-from genpolicy.wall_clock.admission import judge
 from genpolicy.wall_clock.messages import Answer, Operator, Order
-from genpolicy.wall_clock.session import SupervisedSession
-from genpolicy.wall_clock.streamed import StreamedJournal
-
-PERIOD_S = 0.05
-
-
-class Told:
-    """A session, and a judge that answers at once or when it is asked to."""
-
-    def __init__(self, session, task, checker):
-        self.session, self.task, self.checker, self.jobs = session, task, checker, []
-        self.row = -1
-
-    def tick(self, now_s=None):
-        self.row += 1
-        return self.session.tick(self.row * PERIOD_S if now_s is None else now_s, self.row)
-
-    def answer(self, ask, *, at=0.01, **changes):
-        actions = np.tile(self.task.action_at(ask.observations[-1]), (16, 1))
-        said = {"invocation": ask.invocation, "checkpoint": "c" * 64, "sampler": "5" * 64,
-                "method": "m", "actions": actions}  # fmt: skip
-        now_s = self.row * PERIOD_S + at
-        self.session.answer(Answer(**(said | changes)), now_s, self.take)
-
-    def take(self, job):
-        self.jobs.append(job)
-        return True
-
-    def decide(self, at=0.02):
-        job = self.jobs.pop(0)
-        result = judge(self.task, self.checker, job)
-        self.session.decide(job, result, self.row * PERIOD_S + at)
-        return result
-
-    def count(self, kind):
-        return sum(event.kind == kind for event in self.session.journal.events())
-
-    def end(self):
-        return self.session.end((self.row + 1) * PERIOD_S)
-
-    def checked(self):
-        events = self.session.journal.events()
-        report = check_messages(
-            (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in events
-        )
-        return {violation.rule for violation in report.violations}
-
-
-@pytest.fixture
-def told(kit, task, checker, standing, tmp_path):
-    return begin(kit, task, checker, standing, tmp_path)
-
-
-def begin(kit, task, checker, standing, tmp_path, *, stop_stands=False, **changes):
-    execution = kit.EXECUTION.model_copy(update={"silence_stop_s": 0.6} | changes)
-    session = SupervisedSession(
-        task, Cell(kit.HORIZONS, execution), request_of(tmp_path, standing),
-        StreamedJournal("m/0", tmp_path / "session_0.mcap"), stop_stands=stop_stands,
-    )  # fmt: skip
-    return Told(session, task, checker)
 
 
 def test_an_answer_is_executed_from_the_next_tick_on(told):
@@ -130,22 +67,6 @@ def test_a_task_that_cannot_tell_its_scene_does_not_keep_a_force_from_stopping(t
     told.tick()
     assert told.session.stub.supervisor.stopped and told.session.stub.accepted == 0
     told.tick()
-    told.end()
-    assert told.checked() == set()
-
-
-def test_the_next_ask_begins_where_the_recorded_arm_is(told):
-    told.answer(told.tick())
-    told.decide()
-    asks = []
-    while not asks:
-        asks += [ask for ask in [told.tick()] if ask]
-    assert told.count("reset") == 1 and told.session.executor.session_epoch == 1
-    told.answer(asks[0])
-    told.decide()
-    before = told.session.stub.accepted
-    told.tick()
-    assert told.session.stub.accepted == before + 1
     told.end()
     assert told.checked() == set()
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from arranged import CHECKPOINT, SAMPLER, request_of
+from told import begin, onward
 
 from genpolicy.execution.cell import Cell
+from genpolicy.verification.checker import check_messages
 from genpolicy.wall_clock.admission import judge
 from genpolicy.wall_clock.messages import Answer
 from genpolicy.wall_clock.session import SupervisedSession
@@ -75,3 +77,62 @@ def test_an_invocation_that_failed_misses_its_deadline_and_no_other(told):
 
     assert "deadline" not in ends(told(0.001))
     assert ends(told(0.001, fails=[1]))[:4] == ["answered", "deadline", "answered", "answered"]
+
+
+@pytest.fixture
+def moving(kit, task, checker, standing, tmp_path):
+    """What a policy that moves the arm was asked by the virtual clock, and its session."""
+    session = begin(kit, task, checker, standing.part(0, 24), tmp_path).session
+    asks = []
+
+    def moves(ask):
+        asks.append(ask)
+        return Answer(ask.invocation, CHECKPOINT, SAMPLER, "m", onward(task, ask))
+
+    run_virtually(
+        session, sample=moves, latency_s=lambda number: 0.08,
+        judged=lambda job: judge(task, checker, job),
+    )  # fmt: skip
+    return asks, session
+
+
+def test_actions_are_executed_while_the_policy_answers_and_chunks_take_over_without_a_reset(moving):
+    _, session = moving
+    events = session.journal.events()
+    flying, beside = set(), 0
+    for event in events:
+        if event.kind == "invocation":
+            (flying.add if event.payload["stage"] == "begin" else flying.discard)(
+                event.payload["id"]
+            )
+        beside += event.kind == "accept" and bool(flying)
+    gone = [(e.payload["ended"], e.payload["reason"]) for e in events if e.kind == "discard"]
+    assert [e for e in events if e.kind == "reset"] == []
+    assert gone[:4] == [("executed", "superseded")] * 4
+    assert beside == 5  # one row of each chunk that another takes over from, and of the last
+    assert session.stub.accepted == 22  # all but the rows before the first answer
+    report = check_messages(
+        (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in events
+    )
+    assert report.violations == []
+
+
+def test_both_clocks_ask_about_the_same_arm(moving, kit, task, checker, standing, tmp_path):
+    """By a clock whose ticks are late by another time each, answers come in between."""
+    asks, session = moving
+    told = begin(kit, task, checker, standing.part(0, 24), tmp_path / "other")
+    seen, asked, late = [], None, np.random.default_rng(5).uniform(0.0, 0.004, 24)
+    for row in range(24):
+        if asked is not None and row == asked[0] + 2:
+            told.answer(asked[1], at=0.03, actions=onward(task, asked[1]))
+            told.decide(0.04)
+        ask = told.tick(row * PERIOD_S + late[row])
+        if ask is not None:
+            seen, asked = [*seen, ask], (row, ask)
+    assert len(seen) == len(asks) == 6
+    for one, other in zip(seen, asks, strict=True):
+        assert one.noise == other.noise
+        assert one.observations.tobytes() == other.observations.tobytes()
+    assert told.session.stub.accepted == session.stub.accepted
+    told.end()
+    assert told.checked() == set()
