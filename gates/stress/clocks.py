@@ -36,10 +36,16 @@ SHOWN = {
 }  # fmt: skip
 AGREE, DIFFER, UNTOLD, UNSEEN = "agree", "differ", "cannot be told apart or alike", "not looked at"
 LEAVES = (
-    "Recordings do not follow the policy: each question begins anew where the recorded arm is. How "
-    "the chunk before is executed while the policy answers, how chunks join and how a rollout ends "
+    "The arm of a window goes where the stub's commands lead, exactly and a period late. The scene "
+    "does not move with it, forces and phases are those of the recording, and how a rollout ends "
     "was not seen by the wall clock."
 )
+ALONE = (
+    "No chunk took over from one that still had rows, by either clock: how chunks follow each "
+    "other while the policy answers was not seen. So it is where a task's arm cannot be followed: "
+    "each question begins anew where the recorded arm is."
+)
+"""Said where that is so of all that was compared."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,11 @@ class Difference:
         """Whether it is shown to be outside."""
         low, high = self.interval
         return self.tolerance is not None and (low > self.tolerance or high < -self.tolerance)
+
+    @property
+    def never(self) -> bool:
+        """Whether neither clock did it."""
+        return self.wall == self.virtual == 0.0
 
 
 @dataclass(frozen=True)
@@ -123,9 +134,10 @@ def clocks_said(judged: Judged) -> Sequence[str]:
         if found.answer == UNSEEN:
             texts.append(f"{candidate}: the wall clock was not looked at ({found.why}).")
             continue
+        alone = any(item.name == REPLACED and item.never for item in found.differences)
         texts.append(
             f"{candidate}: the virtual clock and the wall clock {found.answer} ({found.why}; "
-            f"{found.episodes} episodes). {LEAVES}"
+            f"{found.episodes} episodes). {LEAVES}{f' {ALONE}' if alone else ''}"
         )
     return texts
 

@@ -34,11 +34,11 @@ class Job:
     Attributes:
         proposal: The chunk.
         history: The last two observations or fewer, newest last. Shape (n, D_o).
-        commanded: The operator's last commands, oldest first. Shape (m, 10).
+        commanded: The last commands before the chunk's first row, oldest first. Shape (m, 10).
         session: What is in force.
         event_s: When the newest observation was exposed, s.
         now_s: When the answer came, s.
-        phase: Task phase of the observation.
+        phase: Task phase of the newest observation.
         late_rows: Rows that are late and will never be executed.
     """
 
@@ -57,7 +57,7 @@ Result = Admitted | Rejected | None
 
 
 def judge(task: Task, checker: FeasibilityChecker, job: Job) -> Admitted | Rejected:
-    """Projection and the six layers, as in shadow evidence: the arm is where it was recorded."""
+    """Projection and the six layers, as in shadow evidence: the arm is where it is observed."""
     q, _ = checker.ik_chunk(task.action_at(job.history[-1])[None], task.posture_rad)
     before = None
     if len(job.history) > 1:

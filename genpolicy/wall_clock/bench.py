@@ -35,7 +35,8 @@ class WallClockSection(Settings):
 
     Attributes:
         episodes: Held-out episodes of which a window is replayed, at most.
-        rows: Rows of a window: room for three warm invocations of the default horizons.
+        rows: Rows of a window: room for two warm invocations of the default horizons, of one of
+            them until its chunk has given way.
     """
 
     episodes: int = Field(ge=1)

@@ -141,6 +141,18 @@ def test_it_is_said_and_judged_by_nobody(ladder):
     assert {clocks.INVOCATIONS, clocks.AGES} <= set(report.materials)
 
 
+@pytest.mark.parametrize(("clocks_without", "said"), [(["wall"], 0), (["wall", "virtual"], 1)])
+def test_where_no_chunk_took_over_from_another_it_is_said(clocks_without, said, ladder):
+    def alone(frame):
+        rows = (frame["method"] == "flow") & frame["clock"].isin(clocks_without)
+        return frame.assign(replaced=frame["replaced"] & ~rows)
+
+    evidence.edit_table(ladder, INVOCATIONS, alone)
+    texts = [text for text in judge(ladder, "D").caveats if "wall clock" in text]
+    assert all(clocks.LEAVES in text for text in texts)
+    assert [clocks.ALONE in text for text in texts] == [False, bool(said)]
+
+
 def test_the_page_has_every_number(ladder):
     report = judge(ladder, "D")
     heads, *lines = tables_clocks.CLOCKS.read(Evidence(ladder), report)
