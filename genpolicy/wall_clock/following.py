@@ -112,7 +112,8 @@ class RecordedArm:
 
     def at(self, row: int) -> Array:
         """As recorded."""
-        return self._replay.observation_rows[row]
+        seen: Array = self._replay.observation_rows[row]
+        return seen
 
     def history(self, row: int, horizon: int) -> Array:
         """As recorded."""
