@@ -36,8 +36,14 @@ class Arm(Protocol):
         """What is observed at a row. Shape (D_o,)."""
         ...
 
-    def history(self, row: int, horizon: int) -> Array:
-        """The last observations up to a row; the first is repeated. Shape (horizon, D_o)."""
+    def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
+        """The last observations up to a row; the first is repeated. Shape (horizon, D_o).
+
+        Args:
+            row: The row.
+            horizon: How many.
+            scene: Row whose scene they end with, where it is another one.
+        """
         ...
 
     def commanded(self, asked: int, first: int) -> Array:
@@ -115,9 +121,9 @@ class RecordedArm:
         seen: Array = self._replay.observation_rows[row]
         return seen
 
-    def history(self, row: int, horizon: int) -> Array:
+    def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
         """As recorded."""
-        return self._replay.history(row, horizon)
+        return self._replay.history(row if scene is None else scene, horizon)
 
     def commanded(self, asked: int, first: int) -> Array:
         """The operator's, up to where it was asked for."""
@@ -156,11 +162,11 @@ class FollowingArm:
         """What was recorded, with the arm where it is."""
         return place(self._replay.observation_rows[row], self._pose(row), self._columns)
 
-    def history(self, row: int, horizon: int) -> Array:
+    def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
         """What was recorded, with the arm where it was at each of these rows."""
-        rows = np.arange(row - horizon + 1, row + 1).tolist()
-        poses = np.stack([self._pose(each) for each in rows])
-        return place(self._replay.history(row, horizon), poses, self._columns)
+        poses = np.stack([self._pose(each) for each in range(row - horizon + 1, row + 1)])
+        recorded = self._replay.history(row if scene is None else scene, horizon)
+        return place(recorded, poses, self._columns)
 
     def commanded(self, asked: int, first: int) -> Array:
         """Before the first command the arm's own pose; where nothing runs on, it is held."""

@@ -216,11 +216,12 @@ class SupervisedSession:
         if late_rows >= self.cell.horizons.execution_horizon:
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
+        # The scene is that of the question: it stands on record, whatever ticks by until delivery.
         row, seen_s = self._seen if self.arm.follows else (asked.row, asked.asked_s)
         taken = submit(
             Job(
                 proposal=propose([Candidate(asked.metadata, answer.actions)]),
-                history=self.arm.history(row, min(row + 1, 2)),
+                history=self.arm.history(row, min(row + 1, 2), scene=asked.row),
                 commanded=self.arm.commanded(asked.row, asked.first_row),
                 session=self._in_force(),
                 event_s=seen_s,

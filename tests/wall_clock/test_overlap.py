@@ -3,6 +3,7 @@
 import numpy as np
 from told import PERIOD_S, STEP_M, begin, onward
 
+from genpolicy.wall_clock.following import arm_of
 from genpolicy.wall_clock.messages import Answer, Operator, Order
 
 
@@ -60,6 +61,24 @@ def test_what_is_judged_is_the_arm_that_follows_and_the_commands_up_to_its_first
         assert told.task.action_at(seen).tobytes() == command.tobytes()
     assert job.commanded.tobytes() == np.stack(given[-3:]).tobytes()
     assert job.event_s == told.row * PERIOD_S and job.late_rows == 2
+
+
+def test_what_is_judged_is_judged_in_the_scene_of_the_question(told):
+    """The checker finds no other on record where ticks go by until a chunk takes over."""
+    contract, replay = told.task.observation, told.session.replay
+    horizon = told.session.cell.horizons.execution_horizon
+    rows = np.array(replay.observations)
+    rows[:, contract.slices["post_position_m"]] += 1e-4 * np.arange(len(rows))[:, None]
+    shifted = replay.model_copy(update={"observations": tuple(map(tuple, rows.tolist()))})
+    told.session.replay = shifted
+    told.session.arm = arm_of(told.task, shifted, horizon=horizon)
+    ask = told.tick()
+    told.tick()
+    told.answer(ask, actions=onward(told.task, ask))
+    seen, asked = (told.task.scene_poses(each) for each in (told.jobs[0].history[-1], rows[0]))
+    assert {n: at.tolist() for n, (at, _) in seen.items()} == {
+        n: at.tolist() for n, (at, _) in asked.items()
+    }
 
 
 def test_until_the_row_that_a_chunk_was_judged_for_the_one_before_goes_on(told):
