@@ -211,11 +211,12 @@ class SupervisedSession:
             sampler_config_hash=answer.sampler, method=answer.method,
         )  # fmt: skip
         self.executor.end_invocation(now_s, asked.metadata.chunk_id, "answered")
-        asked.first_row = self._next_row(now_s, judging_s)
-        late_rows = asked.first_row - asked.row
-        if late_rows >= self.cell.horizons.execution_horizon:
+        last_row = asked.row + self.cell.horizons.execution_horizon - 1
+        if self._next_row(now_s, 0.0) > last_row:
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
+        # One verdict that took too long must not keep all that follow from being judged.
+        asked.first_row = min(self._next_row(now_s, judging_s), last_row)
         # The scene is that of the question: it stands on record, whatever ticks by until delivery.
         row, seen_s = self._seen if self.arm.follows else (asked.row, asked.asked_s)
         taken = submit(
@@ -227,7 +228,7 @@ class SupervisedSession:
                 event_s=seen_s,
                 now_s=now_s,
                 phase=self.replay.phases[row],
-                late_rows=late_rows,
+                late_rows=asked.first_row - asked.row,
             )
         )
         if not taken:

@@ -213,8 +213,9 @@ def test_a_cause_without_a_person_is_an_emergency_stop(told):
 
 @pytest.mark.parametrize(
     ("at", "judging_s", "first"),
-    [(0.01, 0.0, 1), (0.01, 0.03, 1), (0.01, 0.05, 2), (0.045, 0.01, 2), (0.06, 0.01, 2)],
-)
+    [(0.01, 0.0, 1), (0.01, 0.03, 1), (0.01, 0.05, 2), (0.045, 0.01, 2), (0.06, 0.01, 2),
+     (0.01, 0.4, 7), (0.01, 60.0, 7)],
+)  # fmt: skip
 def test_a_chunk_is_judged_for_the_first_row_that_its_verdict_can_be_in_time_for(
     told, at, judging_s, first
 ):
