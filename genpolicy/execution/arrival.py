@@ -27,8 +27,13 @@ def shape_of(admitted: "Admitted") -> tuple[int, str]:
     except Exception:  # of whatever it is, reading it may raise anything
         return 0, MALFORMED
     rows = len(actions) if type(actions) is np.ndarray and actions.ndim == 2 else 0
+    return rows, named_in(metadata)
+
+
+def named_in(metadata: object) -> str:
+    """Name of the chunk that metadata are of, malformed things included."""
     named = type(metadata) is ChunkMetadata and type(metadata.chunk_id) is str
-    return rows, metadata.chunk_id if named else MALFORMED
+    return metadata.chunk_id if named else MALFORMED  # type: ignore[attr-defined]
 
 
 def read_chunk(admitted: "Admitted", *, arrival: int, source: str) -> Chunk | None:
@@ -97,10 +102,18 @@ class Arrivals:
         self._queue.refuse(now_ns, arrival=arrival, chunk_id=name, rows=rows, reason=str(reason))
         return reason
 
-    def write_off(self, now_ns: int, name: str, rows: int, reason: DiscardReason) -> None:
+    def write_off(
+        self, now_ns: int, metadata: ChunkMetadata, rows: int, reason: DiscardReason
+    ) -> None:
         """Account for a chunk that never became deliverable; twice is a duplicate."""
-        if name in self._names:
-            reason = DiscardReason.DUPLICATE
-        self._names.add(name)
+        name = named_in(metadata)
+        if type(rows) is not int or rows < 0:
+            rows = 0
+        if type(reason) is not DiscardReason:
+            reason = DiscardReason.INFEASIBLE
+        if name != MALFORMED:  # it names no chunk, so that another one like it is no duplicate
+            if name in self._names:
+                reason = DiscardReason.DUPLICATE
+            self._names.add(name)
         arrival = self._queue.arrive(rows)
         self._queue.refuse(now_ns, arrival=arrival, chunk_id=name, rows=rows, reason=str(reason))

@@ -4,15 +4,19 @@ A stop must not depend on a valid argument, and one wrong reading must not end a
 time, lies before an earlier one or far ahead of it is counted and not believed, so that time on
 record never goes back. The price: a reading far ahead that was believed, as the first one is, since
 there is nothing to hold it against, cannot be taken back; all that was seen, voided, stopped and
-commanded lies before it. Such a session holds, says why, and is ended by a person who begins
-another one.
+commanded lies before it. Such a session holds, says why and for how long yet, and is ended by a
+person who begins another one. How far ahead a reading may lie and be believed is how long it holds.
 """
 
 from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, ns_or_none
 
 NO_TIME, CLOCK_BACKWARDS, CLOCK_AHEAD = "no_time", "clock_backwards", "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
-"""No component of a session is silent for longer; a clock that is further ahead is doubted."""
+"""No component of a session is silent for longer; a clock that is further ahead is doubted.
+
+It bounds what one wrong reading costs: behind it a session holds for at most so long, unless its
+first reading was the wrong one, or a person read it twice.
+"""
 
 
 class BelievedClock:
@@ -59,12 +63,17 @@ class BelievedClock:
         return self.clock(now_s)
 
     def beside(self, now_s: float) -> str:
-        """In words, how far a reading lies from the newest time that is believed."""
+        """In words, how far a reading lies from the newest time that is believed.
+
+        Of one behind it also how long to wait until such a clock is believed again.
+        """
         now_ns = ns_or_none(now_s)
         if now_ns is None:
             return "no time"
         beside_s = (now_ns - self.latest_ns) / NS_PER_S
-        return f"{abs(beside_s):.3f} s {'behind' if beside_s < 0 else 'ahead'}"
+        if beside_s >= 0:
+            return f"{beside_s:.3f} s ahead"
+        return f"{-beside_s:.3f} s behind (believed again in {-beside_s:.3f} s, not before)"
 
     def is_lost(self, now_s: float) -> bool:
         """Whether a clock that says this is further back than anybody would wait for."""

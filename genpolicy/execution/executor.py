@@ -19,6 +19,7 @@ from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS
+from genpolicy.execution.observed import name_of
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import SupervisorState
 from genpolicy.feasibility.admission import Admitted
@@ -136,16 +137,21 @@ class Executor(Informed):
         return self._queue.remaining(now_ns) <= self.cell.execution.replan_lead_rows
 
     def begin_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
-        """An invocation is in flight until `end_invocation` or a reset; `detail` goes on record."""
+        """An invocation is in flight until `end_invocation` or a reset; `detail` goes on record.
+
+        What is no name is one without a name, which is in flight like any other.
+        """
         self._begin(now_s)
-        self._in_flight.add(invocation_id)
-        self._journal.invocation(now_s, invocation_id=invocation_id, stage="begin", detail=detail)
+        name, told = name_of(invocation_id), name_of(detail)
+        self._in_flight.add(name)
+        self._journal.invocation(now_s, invocation_id=name, stage="begin", detail=told)
 
     def end_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
         """The invocation answered, failed or was given up; `detail` says which."""
         self._begin(now_s)
-        self._in_flight.discard(invocation_id)
-        self._journal.invocation(now_s, invocation_id=invocation_id, stage="end", detail=detail)
+        name, told = name_of(invocation_id), name_of(detail)
+        self._in_flight.discard(name)
+        self._journal.invocation(now_s, invocation_id=name, stage="end", detail=told)
 
     def deliver(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
         """Enqueue a chunk of the policy, or discard it; None if enqueued, else why not."""
@@ -160,9 +166,11 @@ class Executor(Informed):
     ) -> None:
         """Account for a chunk of so many rows that never became deliverable.
 
-        `infeasible` if a layer rejected it; `expired` if it was lost or cancelled.
+        `infeasible` if a layer rejected it; `expired` if it was lost or cancelled. What does not
+        say which chunk, how many rows or why is counted all the same, as malformed, of none, or
+        infeasible.
         """
-        self._arrivals.write_off(self._begin(now_s), metadata.chunk_id, rows, reason)
+        self._arrivals.write_off(self._begin(now_s), metadata, rows, reason)
 
     def conservation(self) -> Conservation:
         """`generated = executed + discarded by reason + still queued`, chunks and actions."""

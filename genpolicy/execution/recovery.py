@@ -25,6 +25,7 @@ from genpolicy.execution.cell import (
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import ns_or_none, to_ns
+from genpolicy.execution.observed import name_of
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
@@ -64,7 +65,7 @@ class Recovery:
         if self.state is not RecoveryState.IDLE:
             return
         self.attempts += 1
-        self._phase, self._peak_n = phase, 0.0
+        self._phase, self._peak_n = name_of(phase), 0.0
         self._go(now_s, RecoveryState.HOLD, cause)
 
     def feel(self, now_s: float, force_n: float) -> None:
@@ -164,7 +165,8 @@ class Recovery:
 
     def _go(self, now_s: float, state: RecoveryState, cause: str) -> None:
         payload = {
-            "old": str(self.state), "new": str(state), "cause": cause, "phase": self._phase,
+            "old": str(self.state), "new": str(state), "cause": name_of(cause),
+            "phase": self._phase,
             "failures": self.failures,
         }  # fmt: skip
         self._since_ns = self._journal.clock(now_s)

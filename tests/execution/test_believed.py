@@ -1,12 +1,13 @@
 """Which readings of a clock are believed, and what a person can do about one that was wrong."""
 
 import math
+import re
 
 import pytest
-from playing import begin, judged
+from playing import begin, checked, judged
 
 from genpolicy.evidence.shadow.rig import Rig
-from genpolicy.execution.believed import BelievedClock
+from genpolicy.execution.believed import LONGEST_JUMP_NS, BelievedClock
 from genpolicy.execution.nanoseconds import NEVER_NS
 from genpolicy.execution.supervisor import DoubtedTimeError
 
@@ -51,8 +52,10 @@ def test_what_a_person_reads_once_may_be_the_glitch():
 
 @pytest.mark.parametrize(
     ("now_s", "said", "lost"),
-    [(41.5, "58.500 s behind", False), (39.0, "61.000 s behind", True), (100.0, "0.000 s ahead",
-      False), (HOUR_S, "3500.000 s ahead", False), (math.nan, "no time", False)],
+    [(41.5, "58.500 s behind (believed again in 58.500 s, not before)", False),
+     (39.0, "61.000 s behind (believed again in 61.000 s, not before)", True),
+     (100.0, "0.000 s ahead", False), (HOUR_S, "3500.000 s ahead", False),
+     (math.nan, "no time", False)],
 )  # fmt: skip
 def test_how_far_it_is_beside_what_was_believed(now_s, said, lost):
     clock = BelievedClock()
@@ -116,6 +119,38 @@ class AheadAtTheReset(Rig):
         begin(self)
         executor.tick(HOUR_S)
         self.supervisor.human_reset(HOUR_S, "Ann")
+
+
+STEP_S = 0.05
+"""Between the last tick before and the glitch; one that lies further ahead is not believed."""
+
+
+@pytest.mark.parametrize("silence_stop_s", [None, 1.0])
+@pytest.mark.parametrize("ahead_s", [0.5, 45.0, LONGEST_JUMP_NS / 1e9 - STEP_S])
+def test_a_glitch_that_was_believed_holds_for_as_long_and_not_longer(ahead_s, silence_stop_s):
+    """A person is told how long; until then nothing moves, and nothing seen before moves after."""
+    rig = Rig(silence_stop_s=silence_stop_s)
+    begin(rig)
+    seen_before = rig.chunk(valid_until_s=rig.now_s + HOUR_S, predecessor_chunk_id="")
+    back_ns = rig.now_ns + round(ahead_s * 1e9)
+    assert rig.executor.tick(rig.now_s + ahead_s).kind != "action"
+    rig.supervisor.emergency_stop(rig.now_s)
+    stops = rig.supervisor.stops
+    while rig.now_ns < back_ns:
+        rig.observe()
+        rig.deliver(rig.chunk(predecessor_chunk_id=""))
+        assert rig.executor.tick(rig.now_s).kind == "stop"
+        with pytest.raises(DoubtedTimeError, match="believed again in ") as refused:
+            rig.supervisor.human_reset(rig.now_s, "Ann")
+        told_s = float(re.search(r"again in ([\d.]+) s", str(refused.value))[1])
+        assert rig.now_ns + round(told_s * 1e9) == back_ns  # the first moment, to the millisecond
+        rig.now_ns += min(round(STEP_S * 1e9) if ahead_s < 1 else 5 * 10**9, back_ns - rig.now_ns)
+    rig.supervisor.human_reset(rig.now_s, "Ann")
+    assert rig.supervisor.stops == stops  # a doubted clock behind stops nobody again
+    assert rig.deliver(seen_before) is not None
+    assert [c.kind for c in rig.run(2, predecessor_chunk_id="")] == ["action"] * 2
+    report = checked(rig.end())  # by the journal nobody held while it leapt: no evidence passes so
+    assert [v.rule for v in report.violations] == ["settings.checks", "P2.watchdog"]
 
 
 @pytest.mark.parametrize("made", [AheadAtFirst, AheadAtTheReset])

@@ -1,6 +1,7 @@
 """The table of checks: each question by itself, at and beside its limit; unknown never holds."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -191,3 +192,54 @@ def test_a_mutant_lacks_the_named_rows_alone_and_an_unknown_name_makes_none():
     assert left == [check.name for check in CHECKS if check.name not in ("pace", "issued")]
     with pytest.raises(ConfigError, match=r"\['no such row'\].*names out of"):
         without(CHECKS, "pace", "no such row")
+
+
+POINTS = {
+    "shadow": {Place.LAYER},
+    "enqueue": {Place.DOOR, Place.ARRIVAL, Place.ROOM, Place.ROWS},
+    "pop": {Place.QUEUE, Place.PAST, Place.DUE, Place.NEXT},
+    "accept": {Place.STUB},
+}
+"""Where a chunk is asked whether it may move, by the places of the table."""
+ELSEWHERE = {Place.OBSERVED, Place.SUPERVISOR}
+"""Of an observation and of a silence: no chunk is asked."""
+DOCUMENT = Path(__file__).parents[2] / "docs" / "gate-c.md"
+
+
+def asked_at(check):
+    return {point for point, places in POINTS.items() if places & check.places}
+
+
+def told():
+    """Rows of the document that are not asked everywhere: where they are, and why not elsewhere."""
+    text = DOCUMENT.read_text()
+    begin = text.index("| row | " + " | ".join(POINTS) + " | why not everywhere |")
+    lines = text[begin : text.index("\n\n", begin)].splitlines()[2:]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return {
+        name.strip("`"): ({p for p, mark in zip(POINTS, marks, strict=True) if mark}, why)
+        for name, *marks, why in cells
+    }
+
+
+def test_places_are_points_of_a_chunk_or_ask_of_none():
+    assert set().union(*POINTS.values(), ELSEWHERE) == set(Place)
+    assert all(check.places <= ELSEWHERE for check in CHECKS if not asked_at(check))
+
+
+def test_the_freshness_of_a_chunk_is_asked_at_all_four_points():
+    everywhere = [check.name for check in CHECKS if asked_at(check) == set(POINTS)]
+    assert everywhere == [
+        "session_epoch", "checkpoint_mismatch", "sampler_mismatch", "calibration_mismatch",
+        "phase_transition", "future_observation", "stale_observation", "expired",
+    ]  # fmt: skip
+    assert ", ".join(f"`{name}`" for name in everywhere) in DOCUMENT.read_text()
+
+
+def test_what_is_not_asked_everywhere_says_why():
+    """The exceptions from one predicate at shadow, enqueue, every pop and accept; decision 348."""
+    asked = {check.name: asked_at(check) for check in CHECKS}
+    exceptions = {name: points for name, points in asked.items() if points != set(POINTS)}
+    assert {name: points for name, (points, _) in told().items()} == exceptions
+    assert list(told()) == list(exceptions)  # in the order in which they decide
+    assert all(len(why.split()) >= 2 for _, why in told().values())

@@ -313,6 +313,46 @@ def test_no_time_raises_out_of_a_control_path(call, now_s, tmp_path):
     write_journal(tmp_path / "j.mcap", [rig.journal])
 
 
+NO_NAMES = ([], {}, None, 3, object(), {"a"}, math.nan)
+NAMED = {
+    "begin": lambda rig, n: rig.executor.begin_invocation(rig.now_s, n),
+    "begun for": lambda rig, n: rig.executor.begin_invocation(rig.now_s, "i", n),
+    "end": lambda rig, n: rig.executor.end_invocation(rig.now_s, n),
+    "ended by": lambda rig, n: rig.executor.end_invocation(rig.now_s, "i", n),
+    "written off": lambda rig, n: rig.executor.write_off(n, 16, R.EXPIRED, rig.now_s),
+    "rows": lambda rig, n: rig.executor.write_off(rig.chunk().metadata, n, R.EXPIRED, rig.now_s),
+    "fewer than none": lambda rig, n: rig.executor.write_off(n, -1, R.EXPIRED, rig.now_s),
+    "why": lambda rig, n: rig.executor.write_off(rig.chunk().metadata, 16, n, rig.now_s),
+}
+
+
+@pytest.mark.parametrize("name", NO_NAMES, ids=lambda n: repr(n)[:8])
+@pytest.mark.parametrize("call", NAMED)
+def test_no_name_raises_out_of_a_control_path(call, name, tmp_path):
+    rig = Rig()
+    begin(rig)
+    NAMED[call](rig, name)
+    NAMED[call](rig, name)
+    assert rig.tick()[0].kind == "action"
+    judged(rig)
+    write_journal(tmp_path / "j.mcap", [rig.journal])
+
+
+def test_what_names_no_chunk_is_no_duplicate_and_what_names_no_invocation_is_one():
+    rig = Rig()
+    rig.executor.begin_invocation(0.0, [])
+    assert not rig.executor.needs_invocation(0.0)  # something is in flight, whoever it is
+    rig.executor.end_invocation(0.0, {})
+    assert rig.executor.needs_invocation(0.0)
+    for _ in range(2):
+        rig.executor.write_off(None, 16, R.EXPIRED, 0.0)
+    rig.executor.write_off(None, -3, "lost", 0.0)
+    balance = rig.executor.conservation()
+    assert balance.chunks.discarded == {"expired": 2, "infeasible": 1}
+    assert balance.actions.discarded == {"expired": 32, "infeasible": 0}
+    judged(rig)
+
+
 class Hostile:
     @property
     def actions(self):

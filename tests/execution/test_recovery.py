@@ -49,6 +49,14 @@ def test_a_phase_without_a_plan_asks_a_human_and_aborts_without_answer(recovery)
     assert recovery.advance(10.21) is S.ABORT
 
 
+@pytest.mark.parametrize("name", [[], {}, None, 3, object()], ids=lambda n: repr(n)[:8])
+def test_what_is_no_phase_and_no_cause_raises_nothing_and_asks_a_human(recovery, name, tmp_path):
+    recovery.trigger(0.0, name, name)
+    assert recovery.advance(0.2) is S.ASK_HUMAN
+    recovery.stop(0.3, name)
+    write_journal(tmp_path / "j.mcap", [recovery._journal])
+
+
 def test_a_person_resolves_by_name(recovery):
     recovery.trigger(0.0, "release", "dropped")
     recovery.advance(0.2)
