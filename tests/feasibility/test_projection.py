@@ -1,16 +1,30 @@
-"""P9: inside the limits, idempotent, feasible input unchanged, raw kept beside it."""
+"""P9: inside the limits, idempotent, what is admissible unchanged, raw kept beside it.
+
+Idempotent is projection from a command within the workspace. From one outside the way back is cut
+by the speed limit, so that its rows may lie outside as well, and projecting again goes further
+back; such a chunk is refused as `workspace`.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from dense import asked, drawn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.feasibility.plain import PlainChecker
-from genpolicy.contract.action import POSITION, ROTATION
-from genpolicy.contract.chunk import Proposal
+from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
+from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.contract.rotation import angle_between, orthonormality_error, rotation_from_6d
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.cell import cell_of
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.tasks.api import load_task
+
+INSIDE = ((0.37, 0.0, 0.15), (0.40, 0.05, 0.16), (0.45, -0.15, 0.20), (0.31, 0.2, 0.27))
+OUTSIDE = ((0.29, 0.0, 0.15), (0.37, 0.0, 0.29), (0.40, 0.225, 0.15), (0.37, 0.0, 0.281))
+"""Last commands within the workspace of the kit, and beside it."""
 
 
 def again(checker, projected, ctx):
@@ -42,11 +56,14 @@ def limits_hold(checker, kit, actions, ctx):
     noise=st.sampled_from([0.0, 1e-4, 1e-3, 3e-3, 0.02, 0.3]),
     reach=st.floats(0.0, 0.3),
 )
-def test_output_is_within_limits_and_projecting_twice_is_once(checker, kit, seed, noise, reach):
+def test_from_inside_the_workspace_it_is_within_limits_and_projecting_twice_is_once(
+    checker, kit, seed, noise, reach
+):
     rng = np.random.default_rng(seed)
-    ctx = kit.context(checker, kit.START)
-    end = np.array(kit.START) + reach * rng.normal(0, 1, 3)
-    raw = kit.line(kit.START, end) + noise * rng.normal(0, 1, (kit.K, 10)) * ([1] * 9 + [0.3])
+    start = INSIDE[seed % len(INSIDE)]
+    ctx = kit.context(checker, start)
+    end = np.array(start) + reach * rng.normal(0, 1, 3)
+    raw = kit.line(start, end) + noise * rng.normal(0, 1, (kit.K, 10)) * ([1] * 9 + [0.3])
     first = checker.project(kit.proposal(raw), context=ctx)
     assert np.array_equal(first.proposal.actions, raw)
     assert limits_hold(checker, kit, first.actions, ctx)
@@ -54,6 +71,63 @@ def test_output_is_within_limits_and_projecting_twice_is_once(checker, kit, seed
     assert np.abs(second.actions - first.actions).max() <= 1e-9
     moved = np.linalg.norm(first.actions[:, POSITION] - raw[:, POSITION], axis=1).max()
     assert first.position_change_m == pytest.approx(moved, abs=1e-12)
+
+
+def test_from_outside_what_stays_outside_goes_further_and_is_refused_as_workspace(
+    checker, build, kit
+):
+    low, high = np.array(kit.WORKSPACE.lower_m), np.array(kit.WORKSPACE.upper_m)
+    rng, reasons, further_m = np.random.default_rng(1), [], []
+    lenient = build(position_change_limit_m=0.2)  # else most are refused for how far they moved
+    for start in OUTSIDE:
+        ctx = kit.context(checker, start)
+        for noise_m in (0.003, 0.02, 0.02, 0.02) * 4:
+            raw = kit.line(start, np.array(start) + rng.normal(0, 0.01, 3))
+            raw[:, POSITION] += noise_m * rng.normal(0, 1, (kit.K, 3))
+            first = checker.project(kit.proposal(raw), context=ctx)
+            second = again(checker, first, ctx)
+            position = first.actions[:, POSITION]
+            stays = bool(np.any((position < low - 1e-9) | (position > high + 1e-9)))
+            moved_m = float(np.abs(second.actions - first.actions).max())
+            assert stays or moved_m <= 1e-9
+            if moved_m > 1e-9:
+                assert not checker.check(first, context=ctx).passed
+                reasons.append(lenient.check(first, context=ctx).first_reason)
+                further_m.append(moved_m)
+    assert len(reasons) > 5 and set(reasons) == {"workspace"}
+    assert max(further_m) > 1e-3  # no rounding: it is another chunk
+
+
+def test_what_passes_as_it_is_says_the_same_when_it_is_projected(kit):
+    """Dense draws with noise: positions to the bit, the same rotation, the opening in its range."""
+    settings_of = FeasibilitySettings(position_change_limit_m=0.05)
+    cell = cell_of(load_task("tabletop_insertion"), settings_of, action_period_s=kit.PERIOD_S)
+    checker, rng, passed, rewritten = FeasibilityChecker(cell), np.random.default_rng(7), 0, 0
+    for _ in range(4):
+        families = [drawn(rng, cell) for _ in range(64)]
+        found = asked(checker, families, rng.uniform(0, 1, 64) * rng.choice([0.2, 1.0], 64))
+        proposals, contexts = [], []
+        for proposal, ctx in found.values():
+            raw = proposal.actions.copy()
+            for columns, sizes in ((POSITION, (0, 1e-5, 1e-4)), (ROTATION, (0, 1e-6, 1e-3))):
+                raw[:, columns] += rng.normal(0, rng.choice(sizes), raw[:, columns].shape)
+            raw[:, GRIPPER] += rng.normal(0, rng.choice([0, 1e-6, 1e-4]), len(raw))
+            proposals.append(Proposal(proposal.metadata, raw, "first"))
+            contexts.append(ctx)
+        as_they_are = [Projected(p, p.actions, 0.0, 0.0) for p in proposals]
+        verdicts = checker.check_many(as_they_are, contexts)
+        for verdict, one in zip(verdicts, checker.project_many(proposals, contexts), strict=True):
+            if not verdict.passed:
+                continue
+            raw, actions = one.proposal.actions, one.actions
+            assert np.array_equal(actions[:, POSITION], raw[:, POSITION])
+            turned = rotation_from_6d(actions[:, ROTATION]) - rotation_from_6d(raw[:, ROTATION])
+            assert np.abs(turned).max() <= 1e-12
+            assert np.array_equal(actions[:, GRIPPER], np.clip(raw[:, GRIPPER], 0.0, 0.04))
+            assert one.position_change_m == 0.0 and one.rotation_change_rad <= 1e-6
+            passed += 1
+            rewritten += not np.array_equal(actions, raw)
+    assert passed > 30 and rewritten > 10  # columns and openings were written anew
 
 
 @settings(max_examples=30, deadline=None)
