@@ -26,12 +26,14 @@ from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
+from stages._limits import require_pinned_limits
 from stages._stage import ARTIFACTS, Params, main
 
 
 def work(params: Params) -> None:
     """Admit through gate B, then sample, check, corrupt and execute against the stub."""
     admitted = admit("shadow", Path.cwd()).candidates
+    require_pinned_limits(params, Path.cwd())
     require_one_contract("train_generators")
     section = params.section("shadow", ShadowSection)
     feasibility = params.section("feasibility", FeasibilitySettings)

@@ -24,6 +24,7 @@ from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
+from stages._limits import require_pinned_limits
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
@@ -31,6 +32,7 @@ from stages._training import MethodsSection
 def work(params: Params) -> None:
     """Admit through gate C, then run every method under every perturbation."""
     admitted = admit("stress", Path.cwd()).candidates
+    require_pinned_limits(params, Path.cwd())
     require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
     timing = params.section("latency", LatencySection)

@@ -71,9 +71,9 @@ def test_shadow_samples_what_passed_gate_b(
     assert said == {name: "FAIL" if name == failed else "PASS" for name in ALL}
     ran = []
     without(
-        monkeypatch, shadow, "require_one_contract", "load_task", "make_checker", "load_dataset",
-        "two_mode_observations", "held_out_observations", "spread", "missing_checks_evidence",
-        "Shadow", "write_shadow", "gallery_of",
+        monkeypatch, shadow, "require_one_contract", "require_pinned_limits", "load_task",
+        "make_checker", "load_dataset", "two_mode_observations", "held_out_observations", "spread",
+        "missing_checks_evidence", "Shadow", "write_shadow", "gallery_of",
     )  # fmt: skip
 
     def judged(_, policy, *__, **___):
@@ -99,8 +99,8 @@ def test_stress_rolls_out_what_passed_gate_c(
     assert said == {name: "FAIL" if name == failed else "PASS" for name in ALL}
     ran = []
     without(
-        monkeypatch, stress, "require_one_contract", "load_task", "Comparison", "latency_models",
-        "write_stress",
+        monkeypatch, stress, "require_one_contract", "require_pinned_limits", "load_task",
+        "Comparison", "latency_models", "write_stress",
     )  # fmt: skip
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
     monkeypatch.setattr(
