@@ -16,7 +16,8 @@ from genpolicy.evidence.reproducibility.latency import (
     model_rows,
 )
 from genpolicy.evidence.reproducibility.load import candidates_rows
-from genpolicy.evidence.reproducibility.sweep import SweepSection, sweep_latency_rows
+from genpolicy.evidence.reproducibility.sweep import sweep_latency_rows
+from genpolicy.evidence.reproducibility.swept import SweepSection
 from genpolicy.evidence.rows.reproducibility import (
     CandidatesRow,
     LatencyModelRow,

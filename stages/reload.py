@@ -10,7 +10,7 @@ from genpolicy.candidates.judged import trained
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
-from genpolicy.evidence.reproducibility.sweep import SweepSection
+from genpolicy.evidence.reproducibility.swept import SweepSection
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -20,12 +20,13 @@ from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
 
-class AnswerDeadline(Settings):
+class Answering(Settings):
     """Of section `execution` only what names a candidate: the rest would reload it again."""
 
     model_config = ConfigDict(extra="ignore")
 
     deadline_s: float = Field(gt=0.0)
+    replan_lead_rows: int = Field(ge=0)
 
 
 def work(params: Params) -> None:
@@ -36,6 +37,7 @@ def work(params: Params) -> None:
     names = params.section("train_generators", MethodsSection).samplers
     seeds = params.section("policy", PolicySettings).seeds
     stress = params.section("stress", StressSettings)
+    answering = params.section("execution", Answering)
     plan = ReloadPlan(
         task=params.task.name,
         feasibility=params.section("feasibility", FeasibilitySettings),
@@ -45,8 +47,9 @@ def work(params: Params) -> None:
         samples=section.samples,
         deployment=Deployment(
             horizons=params.horizons,
-            deadline_s=params.section("execution", AnswerDeadline).deadline_s,
+            deadline_s=answering.deadline_s,
             samples=stress.samples,
+            replan_lead_rows=answering.replan_lead_rows,
             joining=stress.joining,
         ),
         root_seed=params.seed,

@@ -5,9 +5,9 @@ tree, where nothing else sees an edit. What it writes changes only when they do.
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
 policy that is brought is not what its entry says, or does not answer where it should run already,
-where an exception of one is over, where a method or its sampler is none, where what may differ
-between methods never may, where the machine has no such device, and where the task does not do the
-same again: before anything trains.
+where an exception of one is over, where a method or a sampler of any section is none, where what
+may differ between methods never may, where the machine has no such device, and where the task does
+not do the same again: before anything trains.
 """
 
 import sys
@@ -30,15 +30,13 @@ from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
 from genpolicy.policies.determinism import require_device
-from genpolicy.policies.matched_training import PolicySettings
-from genpolicy.policies.methods import check_sampler, method_named
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
 from genpolicy.tasks.same_again import require_same_again
+from stages._samplers import require_samplers
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
-from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
@@ -51,7 +49,9 @@ def work(params: Params) -> None:
     simple = params.section("stress", StressSettings).baselines
     require_compared(params.task.name, simple, rehearsal=is_rehearsal(params.raw))
     entries = params.section("candidates", BroughtSection).root
-    brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
+    # The planner is that of the task, whether it offers one or not.
+    taken = [PLANNER, *require_samplers(params)]
+    brought = require_brought(entries, horizons=params.horizons, trained=taken)
     names = [policy.entry.name for policy in brought]
     require_unmatched(unmatched_written(params.raw), utc_today(), brought=names)
     if brought:
@@ -103,17 +103,6 @@ def _asked(policy: BroughtPolicy) -> bool:
             action="Start it: then nobody asks the document, and stage `reload` writes it again.",
         ) from error
     return own is not None and own.checkpoint == policy.sha256
-
-
-def _required_methods(params: Params) -> list[str]:
-    """Names of all that is trained here, each a method with a sampler that fits it."""
-    head = params.section("policy", PolicySettings).head
-    names = [PLANNER]  # that of the task, whether it offers one or not
-    for stage in ("train_baselines", "train_generators"):
-        for name, sampler in params.section(stage, MethodsSection).samplers.items():
-            check_sampler(method_named(name), sampler, head)
-            names.append(name)
-    return names
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Figure of Gate B: samplers of the sweep against each other, with the deadline drawn in."""
 
+import math
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -54,7 +55,8 @@ def _front(evidence: Evidence, report: GateReport) -> Figure:
     sweeps = _sweeps(evidence, report)
     colour, shape, dash = colours(sweeps), markers(sweeps), dashes(sweeps)
     figure, places = new_figure(columns=3)
-    for method, (settings, _, _) in sweeps.items():
+    for method, (every, _, _) in sweeps.items():
+        settings = [setting for setting in every if math.isfinite(setting.answer_s)]
         kept = efficient(settings)
         for axes, heights in zip(places, _heights(settings), strict=True):
             times = [setting.answer_s * MILLI for setting in settings]
@@ -105,8 +107,8 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
                     setting.name,
                     f"{setting.nfe}",
                     tolerance,
-                    f"{setting.p50_s * MILLI:.3g}",
-                    f"{setting.answer_s * MILLI:.3g}",
+                    _milliseconds(setting.p50_s),
+                    _milliseconds(setting.answer_s),
                     f"{percent(setting.coverage)} ({percent(setting.coverage_lower)})",
                     f"{setting.chunk_error:.3g}",
                     three(setting.jerk_p95_m_s3),
@@ -116,7 +118,13 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
     return (heads, *rows)
 
 
+def _milliseconds(time_s: float) -> str:
+    return f"{time_s * MILLI:.3g}" if math.isfinite(time_s) else "no answer"
+
+
 def _said(setting: Setting, *, on: bool) -> str:
+    if setting.given_up:
+        return f"no: {setting.given_up} chunks were given up at its cap"
     if setting.nonfinite:
         return f"no: {setting.nonfinite} chunks are no numbers"
     return "yes" if on else "no"

@@ -109,12 +109,13 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
     colour = colours(list(frame["method"]))
     dash = dashes(frame["method"])
     for method in in_order(frame["method"]):
-        own = frame[frame["method"] == method].sort_values("nfe").groupby("sampler")
-        for marker, (sampler, rows) in zip(itertools.cycle("os^vDPX"), own, strict=False):
+        own = frame[frame["method"] == method].sort_values("nfe").groupby(["sampler", "settings"])
+        for marker, (said, rows) in zip(itertools.cycle("os^vDPX"), own, strict=False):
             look = {"color": colour[method], "ls": dash[method], "marker": marker, "ms": 4}
             nfe = numbers(rows, "nfe")
             left.plot(nfe, numbers(rows, "modes_covered_share"), **look)
-            right.plot(nfe, numbers(rows, "spread_m"), label=f"{method}, {sampler}", **look)
+            name = ", ".join(str(part) for part in (method, *said) if part)
+            right.plot(nfe, numbers(rows, "spread_m"), label=name, **look)
     for axes in (left, right):
         axes.set_xscale("log", base=2)
         ticks = sorted(set(numbers(frame, "nfe").tolist()))
@@ -212,7 +213,8 @@ PLOTS = (
     Plot(
         "Modes and spread against NFE",
         "Left: share of held-out situations of which every mode is reached by one sample. Right: "
-        "how far samples of one situation lie apart. One mark per sampler. The gate asks more, at "
+        "how far samples of one situation lie apart. One mark per sampler and its settings, joined "
+        "over its steps or tolerance. The gate asks more, at "
         "the chosen NFE: every mode needs its share of admissible samples, and few may lie "
         "between.",
         COVERAGE,

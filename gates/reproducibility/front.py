@@ -6,8 +6,10 @@ cheapest whose coverage is not below the interval of the best. It is told, and j
 is deployed stands in the parameters.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -29,17 +31,19 @@ class Setting:
     """One sampler of the sweep of a method, with the weights of its first seed.
 
     Attributes:
-        name: Sampler and steps.
+        name: Sampler, steps, and what else it differs in from other settings of its method.
         sha256: Its settings.
         nfe: Network evaluations of a sample.
         tolerance: Of a solver that chooses its steps; None of the others.
-        p50_s: Median from observation to proposal, s.
-        answer_s: p95 of that, and of every other term, summed, s.
+        p50_s: Median from observation to proposal, s; infinite where no answer came.
+        answer_s: p95 of that, and of every other term, summed, s; likewise.
         coverage: Share of situations of which every mode is reached.
         coverage_lower: Lower end of its interval.
         chunk_error: Mean absolute error on held-out windows, normalised units.
         jerk_p95_m_s3: p95 of the largest jerk inside a chunk, m/s^3.
-        nonfinite: Chunks on held-out windows that are no numbers; their error and jerk are NaN.
+        nonfinite: Chunks on held-out windows that are no numbers, or never came; their error and
+            jerk are NaN.
+        given_up: Of these, those that were given up at the sampler's cap.
     """
 
     name: str
@@ -53,6 +57,7 @@ class Setting:
     chunk_error: float
     jerk_p95_m_s3: float
     nonfinite: int = 0
+    given_up: int = 0
 
     def dominates(self, other: "Setting") -> bool:
         """As good in everything, and better in something; what diverges is as good as nothing."""
@@ -92,21 +97,42 @@ def settings_of(evidence: Evidence, method: str, *, confidence: float) -> list[S
     times = evidence.of(SWEEP, SweepLatencyRow, method)
     budget = budget_of(evidence.of(LATENCY, LatencyRow, method), "warm", confidence=confidence)
     rest_s = budget.sum_of_p95_s - sum(budget.terms[term].p95[0] for term in SWEPT_TERMS)
-    found = [
+    found = _told_apart(
         _setting(row, times[times["sampler_sha256"] == row["sampler_sha256"]], rest_s)
         for row in drawn.to_dict("records")
-    ]
+    )
     return sorted(found, key=lambda setting: (setting.p50_s, setting.name))
 
 
+def _told_apart(found: Iterable[Setting]) -> list[Setting]:
+    """The same; those that still have one name, as of who says little of itself, by their hash."""
+    settings = list(found)
+    called = Counter(setting.name for setting in settings)
+    return [
+        setting
+        if called[setting.name] == 1
+        else replace(setting, name=f"{setting.name} ({setting.sha256[:8]})")
+        for setting in settings
+    ]
+
+
+def _name(row: Mapping[str, object], tolerance: float | None) -> str:
+    parts = [f"{row['sampler']}, {row['steps']} steps", str(row["settings"])]
+    if tolerance is not None:
+        parts.append(f"tolerance {tolerance:g}")
+    return ", ".join(part for part in parts if part)
+
+
 def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Setting:
-    name = f"{row['sampler']}, {row['steps']} steps"
-    if len(times) == 0:
+    said = row["tolerance"]
+    known = isinstance(said, float) and bool(np.isfinite(said))
+    tolerance = float(str(said)) if known else None
+    name = _name(row, tolerance)
+    if len(times) == 0 and not int(str(row["nonfinite"])):
         raise MissingEvidenceError(f"{SWEEP} has no times of {row['method']}, {name}")
-    seconds, tolerance = numbers(times, "seconds"), row["tolerance"]
+    seconds = numbers(times, "seconds") if len(times) else np.array([math.inf])
     if not np.all(seconds > 0.0):
         raise MissingEvidenceError(f"{SWEEP} has {name} in no time")
-    known = isinstance(tolerance, float) and bool(np.isfinite(tolerance))
     shares = {
         key: float(str(row[key]))
         for key in ("modes_covered_share", "coverage_lower", "chunk_error", "jerk_p95_m_s3")
@@ -119,7 +145,7 @@ def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Sett
         name=name,
         sha256=str(row["sampler_sha256"]),
         nfe=int(str(row["nfe"])),
-        tolerance=float(str(tolerance)) if known else None,
+        tolerance=tolerance,
         p50_s=float(np.median(seconds)),
         answer_s=float(np.quantile(seconds, P95, method="higher")) + rest_s,
         coverage=shares["modes_covered_share"],
@@ -127,6 +153,7 @@ def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Sett
         chunk_error=shares["chunk_error"],
         jerk_p95_m_s3=shares["jerk_p95_m_s3"],
         nonfinite=int(str(row["nonfinite"])),
+        given_up=int(str(row["given_up"])),
     )
 
 
@@ -178,8 +205,13 @@ def advice(found: Choice, *, deadline_s: float) -> tuple[str, str]:
     )
     if cheaper is None:
         return why, "There is no cheaper one in the sweep."
+    late = (
+        ""
+        if cheaper.answer_s <= deadline_s
+        else (f" and misses the deadline: its answer takes {cheaper.answer_s * MILLI:.3g} ms")
+    )
     return why, (
-        f"{cheaper.name} saves {(deploy.p50_s - cheaper.p50_s) * MILLI:.3g} ms; coverage "
+        f"{cheaper.name} saves {(deploy.p50_s - cheaper.p50_s) * MILLI:.3g} ms{late}; coverage "
         f"{points(cheaper.coverage - deploy.coverage)}, chunk error "
         f"{_relative(cheaper.chunk_error, deploy.chunk_error)}, jerk "
         f"{_relative(cheaper.jerk_p95_m_s3, deploy.jerk_p95_m_s3)}."

@@ -30,6 +30,7 @@ from gates.reproducibility.settings import (
 )
 from genpolicy.evidence.documents.brought import FAULTS
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig
+from genpolicy.evidence.documents.reproducibility import CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import FIXTURES_ON, NfeRow, SampleRow
 
 
@@ -118,13 +119,20 @@ def nonfinite_weights(
         if lie != entry.nonfinite_weights:
             texts.append(f"{entry.nonfinite_weights} weights are said to be none, {lie} are")
         if entry.nonfinite_chunks:
-            texts.append(
-                f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
-            )
+            texts.append(_chunks_said(entry))
         most = max(lie, entry.nonfinite_weights) + entry.nonfinite_chunks
         return Measured(float(most), caveat="; ".join(texts))
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
     return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
+
+
+def _chunks_said(entry: CandidateIdentity) -> str:
+    """Chunks of its own sampler that are none, and how many of them its cap ended."""
+    none = entry.nonfinite_chunks - entry.given_up
+    texts = [f"{none} chunks of its own sampler hold a number that is none"] if none else []
+    if entry.given_up:
+        texts.append(f"{entry.given_up} were given up at sampler.nfe_cap and never came")
+    return "; ".join(texts)
 
 
 def _failed(evidence: Evidence, candidate: str) -> str:

@@ -85,6 +85,9 @@ def unplanned(
         "deadline_s": settings.deadline_s,
         "candidates": settings.invocation_candidates if several else 1,
         "warm_up": WARM_UP,
+        # Asked again when so many actions are left, and once in a period at most.
+        "invocation_rate_hz": card.control_rate_hz
+        / max(1, card.execution_horizon - settings.replan_lead_rows),
     }
     if not isinstance(draws, bool):  # another process has the threads that its maker says
         own["threads"] = THREADS
@@ -107,7 +110,6 @@ def _as_trained(config: TrainedConfig) -> Mapping[str, Any]:
         "prediction_horizon": horizons.get("prediction_horizon"),
         "execution_horizon": horizons.get("execution_horizon"),
         "control_rate_hz": 1.0 / period_s,
-        "invocation_rate_hz": 1.0 / (float(horizons.get("execution_horizon", math.inf)) * period_s),
         "sampler": sampler.get("name"),
         "sampler_steps": sampler.get("steps"),
         "batch_rows": sampler.get("batch_rows"),

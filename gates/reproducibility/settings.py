@@ -76,6 +76,7 @@ class ReproducibilitySettings(CandidateSettings):
         samples: Candidates drawn at each two-mode situation.
         invocation_candidates: Candidates that an invocation draws where it is deployed.
         deadline_s: After which an answer is given up, s.
+        replan_lead_rows: Executable actions left at which the executor asks again.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -92,6 +93,7 @@ class ReproducibilitySettings(CandidateSettings):
         "samples": "reload.samples",
         "invocation_candidates": "stress.samples",
         "deadline_s": "execution.deadline_s",
+        "replan_lead_rows": "execution.replan_lead_rows",
     }
     whole: ClassVar[frozenset[str]] = frozenset({"declared"})
 
@@ -110,6 +112,7 @@ class ReproducibilitySettings(CandidateSettings):
     samples: int = Field(ge=1)
     invocation_candidates: int = Field(ge=1)
     deadline_s: float = Field(gt=0.0)
+    replan_lead_rows: int = Field(ge=0)
 
     @model_validator(mode="after")
     def _exceptions_of_brought(self) -> "ReproducibilitySettings":

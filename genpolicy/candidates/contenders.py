@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, compared, trained
@@ -24,7 +25,7 @@ Running = NetworkPolicy | WirePolicy | PlannerPolicy
 def opened(
     candidate: Contender, contract: ObservationContract, *, scene: Path | None = None
 ) -> Iterator[Running]:
-    """A candidate that can be asked, until the end of the block.
+    """A candidate that can be asked, until the end of the block; what it gives up is NaN.
 
     Args:
         candidate: Who it is.
@@ -38,6 +39,8 @@ def opened(
     if isinstance(candidate, BroughtPolicy):
         with running(candidate, contract, scene=scene) as policy:
             yield policy
+    elif isinstance(candidate, JudgedPolicy):
+        yield AnsweringPolicy(candidate.load())
     else:
         yield candidate.load()
 

@@ -46,7 +46,7 @@ def workspace(fleet, dataset, data, kit, tmp_path, monkeypatch):
     (place / "artifacts" / "ingest").symlink_to(dataset)
     (place / "artifacts" / "reload").mkdir()
     policy = load_policy(place / FLOW)
-    deployment = Deployment(horizons=kit.HORIZONS, deadline_s=0.15, samples=2)
+    deployment = Deployment(horizons=kit.HORIZONS, deadline_s=0.15, samples=2, replan_lead_rows=3)
     identity = {
         "card": asdict(card_of([policy], data, deployment)),
         "seed": [policy.checkpoint.config.training_seed],

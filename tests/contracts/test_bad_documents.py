@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from genpolicy.data.dataset import load_dataset
-from genpolicy.evidence.reproducibility.sweep import SweepSection
+from genpolicy.evidence.reproducibility.swept import SweepSection
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings

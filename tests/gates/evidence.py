@@ -220,6 +220,7 @@ PARAMS: dict[str, Any] = {
     "latency": {"warm": 8, "cold": 8, "declared": DECLARED},
     "execution": {
         "deadline_s": 0.15,
+        "replan_lead_rows": 3,
         "maximum_age_s": 0.45,
         "term_deadlines": [
             ["exposure", 0.05, "drop_observation"],
@@ -1288,6 +1289,7 @@ def _reload(root: Path) -> None:
                 "sampler": "euler",
                 "steps": nfe,
                 "sampler_sha256": f"{m}{nfe}",
+                "settings": "",
                 "tolerance": None,
                 "nfe": nfe,
                 "situations": 30,
@@ -1298,6 +1300,7 @@ def _reload(root: Path) -> None:
                 "between_share": 0.0,
                 "chunk_error": 0.1 + 0.1 / nfe,
                 "nonfinite": 0,
+                "given_up": 0,
                 "jerk_p95_m_s3": 1000.0 + 100.0 / nfe,
             }
             for m in CANDIDATES
@@ -1317,6 +1320,7 @@ def _reload(root: Path) -> None:
                 "metadata_mismatches": 0,
                 "nonfinite_weights": 0,
                 "nonfinite_chunks": 0,
+                "given_up": 0,
                 "card": _identity_card(hashlib.sha256(manifest).hexdigest()),
             }
             for m in CANDIDATES
@@ -1330,7 +1334,7 @@ def _identity_card(dataset: str) -> dict[str, Any]:
         "architecture": "mlp encoder", "parameters": PARAMETERS, "training_seeds": ["0"],
         "dataset": dataset, "split": split_sha256(SPLIT), "action_semantics": "a" * 64,
         "observation_semantics": "b" * 64, "observation_horizon": 2, "prediction_horizon": 16,
-        "execution_horizon": 8, "control_rate_hz": 20.0, "invocation_rate_hz": 2.5,
+        "execution_horizon": 8, "control_rate_hz": 20.0, "invocation_rate_hz": 4.0,
         "deadline_s": 0.15, "path": "straight", "sampler": SAMPLER, "sampler_steps": STEPS,
         "eta": None, "tolerance": None, "evaluations": "8", "precision": "float32",
         "device": "cpu", "threads": 1, "cpu_capability": "AVX2", "warm_up": 10, "batch_rows": 16,

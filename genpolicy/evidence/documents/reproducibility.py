@@ -23,7 +23,8 @@ class IdentityCard:
         prediction_horizon: K, actions of a chunk.
         execution_horizon: H_e, actions executed of it.
         control_rate_hz: Actions per second.
-        invocation_rate_hz: Invocations per second where each chunk is executed to its horizon.
+        invocation_rate_hz: Invocations per second where every answer comes in time: the executor
+            asks again when `execution.replan_lead_rows` actions of a chunk are left.
         deadline_s: Time after which an answer is given up.
         path: Noise schedule or path between noise and action.
         sampler: Name of the sampler.
@@ -90,7 +91,8 @@ class CandidateIdentity:
         nonfinite_weights: Weights that are NaN or infinite, over all seeds; of who was brought,
             invocations without a finite chunk.
         nonfinite_chunks: Chunks of its own sampler on held-out windows that hold a number that is
-            none, over all seeds.
+            none, or that never came, over all seeds.
+        given_up: Of these, those that were given up at the `nfe_cap` of its sampler.
         card: What names it to a reviewer.
     """
 
@@ -104,6 +106,7 @@ class CandidateIdentity:
     metadata_mismatches: Count
     nonfinite_weights: Count
     nonfinite_chunks: Count
+    given_up: Count
     card: IdentityCard
 
 

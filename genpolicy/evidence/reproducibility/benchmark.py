@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.contenders import Running, joining_of
 from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
 from genpolicy.candidates.planned import PlannerPolicy
@@ -101,7 +102,10 @@ def measure_policy(
     """
 
     def load() -> NetworkPolicy:
-        return load_policy(folder, expected_sha256=expected_sha256, sampler=sampler, device=device)
+        policy = load_policy(
+            folder, expected_sha256=expected_sha256, sampler=sampler, device=device
+        )
+        return AnsweringPolicy(policy)
 
     return measure_loaded(
         load,

@@ -34,7 +34,7 @@ from genpolicy.evidence.reproducibility.conformance import (
     first_session,
     second_session,
 )
-from genpolicy.evidence.reproducibility.identity import Deployment, rule_sha256
+from genpolicy.evidence.reproducibility.identity import Deployment, invocation_rate_hz, rule_sha256
 from genpolicy.evidence.reproducibility.sweep import drawn_by, quality_of, swept_windows
 from genpolicy.evidence.reproducibility.variations import wire_otherwise
 from genpolicy.evidence.rows.brought import AnswerRow
@@ -222,7 +222,8 @@ def _coverage(
     return [
         drawn_by(
             modes, steps=declared.sampler_steps, sampler_sha256=candidate.sampler_sha256,
-            tolerance=declared.tolerance, quality=quality,
+            settings=_beside_steps(declared.eta, None), tolerance=declared.tolerance,
+            quality=quality,
         )
     ]  # fmt: skip
 
@@ -240,10 +241,17 @@ def _swept(policy: WirePolicy, candidate: BroughtPolicy, asked: Asked) -> list[C
             rows.append(
                 drawn_by(
                     modes, steps=choice.sampler_steps, sampler_sha256=tried.sampler_config_hash,
-                    tolerance=choice.tolerance, quality=quality_of(tried, windows, asked.data),
+                    settings=_beside_steps(choice.eta, choice.nfe_cap), tolerance=choice.tolerance,
+                    quality=quality_of(tried, windows, asked.data),
                 )
             )  # fmt: skip
     return rows
+
+
+def _beside_steps(eta: float | None, nfe_cap: int | None) -> str:
+    """What an entry says of a sampler that has no column, as `sweep.beside_steps` says it."""
+    said = {"eta": eta, "nfe_cap": nfe_cap}
+    return ", ".join(f"{name} {value:g}" for name, value in said.items() if value)
 
 
 def _sampler(entry: Entry) -> str:
@@ -265,6 +273,7 @@ def _identity(
         metadata_mismatches=differing,
         nonfinite_weights=broken,
         nonfinite_chunks=0,  # among the invocations of `broken`
+        given_up=0,  # by a server, which says no more than that it failed
         card=card_of_brought(candidate, deployment),
     )
 
@@ -285,7 +294,9 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
         prediction_horizon=horizons.prediction_horizon,
         execution_horizon=horizons.execution_horizon,
         control_rate_hz=1.0 / period_s,
-        invocation_rate_hz=1.0 / (horizons.execution_horizon * period_s),
+        invocation_rate_hz=invocation_rate_hz(
+            horizons, replan_lead_rows=deployment.replan_lead_rows
+        ),
         deadline_s=deployment.deadline_s,
         path=said.path if said else "",
         sampler=said.sampler if said else "",

@@ -35,12 +35,14 @@ class Deployment:
         horizons: Horizons of the ladder.
         deadline_s: Time after which an answer is given up.
         samples: Candidates of an invocation of a stochastic method.
+        replan_lead_rows: Executable actions left at which the executor asks again.
         joining: How its chunks join.
     """
 
     horizons: HorizonConfig
     deadline_s: float
     samples: int
+    replan_lead_rows: int
     joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
@@ -64,9 +66,20 @@ def identities(
             metadata_mismatches=0,
             nonfinite_weights=0,
             nonfinite_chunks=0,
+            given_up=0,
             card=card_of(policies, data, deployment),
         )
     return result
+
+
+def invocation_rate_hz(horizons: HorizonConfig, *, replan_lead_rows: int) -> float:
+    """Invocations per second while every answer comes in time, 1/s.
+
+    The executor asks again when `replan_lead_rows` actions of a chunk are left, and at no two
+    moments of one action period. A chunk that comes late, is refused or is held makes it another.
+    """
+    rows = max(1, horizons.execution_horizon - replan_lead_rows)
+    return 1.0 / horizons.action_period_s / rows
 
 
 def card_of(
@@ -90,7 +103,9 @@ def card_of(
         prediction_horizon=horizons.prediction_horizon,
         execution_horizon=horizons.execution_horizon,
         control_rate_hz=1.0 / period_s,
-        invocation_rate_hz=1.0 / (horizons.execution_horizon * period_s),
+        invocation_rate_hz=invocation_rate_hz(
+            horizons, replan_lead_rows=deployment.replan_lead_rows
+        ),
         deadline_s=deployment.deadline_s,
         path=path_of(config, sampler),
         sampler=sampler.name,

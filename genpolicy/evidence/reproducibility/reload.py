@@ -1,10 +1,12 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.judged import JudgedPolicy, loaded_on, sampling_by
 from genpolicy.contract.horizons import HorizonConfig
@@ -23,12 +25,12 @@ from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.reproducibility.sweep import (
-    Sweep,
+    Quality,
     coverage_row,
     quality_of,
-    swept_samplers,
     swept_windows,
 )
+from genpolicy.evidence.reproducibility.swept import Sweep, swept_samplers
 from genpolicy.evidence.reproducibility.variations import trained_otherwise
 from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
@@ -156,14 +158,15 @@ def write_reload(
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
         differing = _reloaded(plan, candidate, before, rows)
         rows.compute += compute_rows(candidate)
-        policy = candidate.load()
-        diverged = _measured(plan, candidate, policy, asked, rows)
+        policy = AnsweringPolicy(candidate.load())
+        own = _measured(plan, candidate, policy, asked, rows)
         entry = identity[candidate.name]
         identity[candidate.name] = replace(
             entry,
             metadata_mismatches=entry.metadata_mismatches + differing,
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
-            nonfinite_chunks=entry.nonfinite_chunks + diverged,
+            nonfinite_chunks=entry.nonfinite_chunks + own.nonfinite,
+            given_up=entry.given_up + own.given_up,
         )
     counts = Counter((row.method, row.seed) for row in written)
     rows.variations += in_fresh_process(
@@ -184,22 +187,22 @@ def _measured(
     policy: NetworkPolicy,
     asked: Asked,
     rows: ReloadRows,
-) -> int:
+) -> Quality:
     """Errors, modes, sweep and densities of a candidate that came back.
 
     Returns:
-        How many of its own sampler's chunks hold a number that is none.
+        What its own sampler draws on held-out windows.
     """
     data, held_out, seed = asked.data, asked.held_out, candidate.seed
     task, checker = asked.task, asked.checker
     rows.offline += offline_rows(policy, data, seed=seed, horizons=plan.horizons)
-    own, swept, diverged = _sweep(
+    own, swept, quality = _sweep(
         plan, policy, held_out, seed, task=task, checker=checker, data=data
     )
     rows.modes += own
     rows.coverage += swept
     rows.earlier += modes_of_policy(
-        loaded_on(candidate.device, candidate.folder / EARLIER_FOLDER),
+        AnsweringPolicy(loaded_on(candidate.device, candidate.folder / EARLIER_FOLDER)),
         held_out,
         seed=seed,
         convention=policy.sampler.name,
@@ -210,7 +213,7 @@ def _measured(
     rows.density += density_rows(
         policy, drawn_situations(held_out), data, seed=seed, samples=plan.samples
     )
-    return diverged
+    return quality
 
 
 def nonfinite_weights(policy: NetworkPolicy) -> int:
@@ -258,15 +261,15 @@ def _sweep(
     task: Task,
     checker: FeasibilityChecker,
     data: Dataset,
-) -> tuple[list[ModeRow], list[CoverageRow], int]:
+) -> tuple[list[ModeRow], list[CoverageRow], Quality]:
     """Modes with the candidate's own sampler, coverage with this one and the swept ones.
 
-    The number is that of chunks of its own sampler that are none.
+    The last is what its own sampler draws on held-out windows.
     """
-    own: list[ModeRow] = []
-    rows, windows, diverged = [], swept_windows(data, plan.horizons), 0
+    own, its_own = list[ModeRow](), Quality(math.nan, math.nan, 0)
+    rows, windows = [], swept_windows(data, plan.horizons)
     for sampler in swept_samplers(policy.sampler, plan.sweep.get(policy.method, ())):
-        tried = sampling_by(policy, sampler)
+        tried = AnsweringPolicy(sampling_by(policy, sampler))
         found = modes_of_policy(
             tried,
             held_out,
@@ -278,7 +281,7 @@ def _sweep(
         )
         quality = quality_of(tried, windows, data)
         if sampler == policy.sampler:
-            own, diverged = found, quality.nonfinite
+            own, its_own = found, quality
         if found:
             rows.append(coverage_row(found, sampler=sampler, quality=quality))
-    return own, rows, diverged
+    return own, rows, its_own

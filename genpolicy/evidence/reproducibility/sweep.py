@@ -5,23 +5,23 @@ A row of either names the sampler's settings by hash, which joins them.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.contenders import Contender, Running, opened
 from genpolicy.candidates.judged import candidates_of, sampling_by
 from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.evidence.reproducibility.swept import Sweep, beside_steps, swept_samplers
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
 from genpolicy.policies.fixtures import fixture_observations
@@ -35,24 +35,9 @@ from genpolicy.progress import counting
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import load_task
 
-Sweep = Mapping[str, Sequence[int | SamplerConfig]]
-
 SPLIT, WINDOWS = "test", 256
 JERK_LEVEL = 0.95
 REPEATS, DISCARDED = 40, 3
-
-
-class SweepSection(Settings):
-    """Of section `reload` what the stages of the sweep share.
-
-    Attributes:
-        sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
-            the chosen one.
-        samples: Candidates per situation.
-    """
-
-    sweep: dict[str, list[int | SamplerConfig]]
-    samples: int = Field(ge=2)
 
 
 @dataclass(frozen=True)
@@ -64,22 +49,14 @@ class Quality:
             NaN where a chunk is no numbers, since a mean over the others would flatter.
         jerk_p95_m_s3: Over chunks, of the largest jerk of the positions inside one, m/s^3; NaN
             there too.
-        nonfinite: Chunks that hold a number that is none.
+        nonfinite: Chunks that hold a number that is none, or never came.
+        given_up: Of these, those that were given up at the sampler's cap.
     """
 
     chunk_error: float
     jerk_p95_m_s3: float
     nonfinite: int
-
-
-def swept_samplers(own: SamplerConfig, sweep: Sequence[int | SamplerConfig]) -> list[SamplerConfig]:
-    """The candidate's own sampler and those to try, each once, by name and steps."""
-    tried = [
-        own.model_copy(update={"steps": entry}) if isinstance(entry, int) else entry
-        for entry in sweep
-    ]
-    different = {sampler.hash(): sampler for sampler in (own, *tried)}
-    return sorted(different.values(), key=lambda sampler: (sampler.name, sampler.steps))
+    given_up: int = 0
 
 
 def swept_windows(data: Dataset, horizons: HorizonConfig) -> Windows:
@@ -98,9 +75,10 @@ def quality_of(policy: Policy, windows: Windows, data: Dataset) -> Quality:
     """
     horizon = policy.prediction_horizon
     names: list[NoiseName] = [("sweep", row) for row in range(len(windows.observations))]
+    before = _given_up(policy)
     drawn = policy.sample(windows.observations, noise_names=names, candidates=1).actions[:, 0]
     if diverged := int((~np.isfinite(drawn)).any(axis=(1, 2)).sum()):
-        return Quality(math.nan, math.nan, diverged)
+        return Quality(math.nan, math.nan, diverged, _given_up(policy) - before)
     scale, wanted = data.normalisation.action, windows.actions[:, :horizon]
     error = np.abs(scale.normalise(drawn) - scale.normalise(wanted)).mean(axis=-1)
     return Quality(
@@ -129,7 +107,7 @@ def coverage_row(
     """One row of `coverage.parquet` from the modes of every situation, at least one."""
     adaptive = sampler.name in ADAPTIVE_TABLEAUS
     return drawn_by(
-        found, steps=sampler.steps, sampler_sha256=sampler.hash(),
+        found, steps=sampler.steps, sampler_sha256=sampler.hash(), settings=beside_steps(sampler),
         tolerance=sampler.tolerance if adaptive else None, quality=quality,
     )  # fmt: skip
 
@@ -139,10 +117,11 @@ def drawn_by(
     *,
     steps: int,
     sampler_sha256: str,
+    settings: str,
     tolerance: float | None,
     quality: Quality,
 ) -> CoverageRow:
-    """The same, of a sampler that is known by its steps, its settings' hash and its tolerance."""
+    """The same, of a sampler that is known by its steps, its settings and their hash."""
     whole = sum(row.modes_covered == row.modes_present for row in found)
     drawn = sum(row.samples for row in found)
     return CoverageRow(
@@ -151,6 +130,7 @@ def drawn_by(
         sampler=found[0].convention,
         steps=steps,
         sampler_sha256=sampler_sha256,
+        settings=settings,
         tolerance=tolerance,
         nfe=max(row.nfe for row in found),
         situations=len(found),
@@ -162,6 +142,7 @@ def drawn_by(
         chunk_error=quality.chunk_error,
         jerk_p95_m_s3=quality.jerk_p95_m_s3,
         nonfinite=quality.nonfinite,
+        given_up=quality.given_up,
     )
 
 
@@ -191,15 +172,22 @@ def measure_sweep(
     with opened(judged, data.observation_contract, scene=scene) as own:
         policies: list[Running] = [own]
         if isinstance(own, NetworkPolicy):
-            policies = [sampling_by(own, tried) for tried in swept_samplers(own.sampler, sweep)]
+            tried = swept_samplers(own.sampler, sweep)
+            policies = [AnsweringPolicy(sampling_by(own, sampler)) for sampler in tried]
         elif isinstance(own, WirePolicy):
             policies += [own.sampling_by(name) for name in own.samplers]
         return _in_turns(plan, judged.name, policies, seen)
 
 
+def _given_up(policy: Policy) -> int:
+    """Invocations so far that a sampler gave up at its cap."""
+    return policy.given_up if isinstance(policy, AnsweringPolicy) else 0
+
+
 def _faults(policy: Running) -> int:
-    """Invocations that ended in a fault; a fault is no answer, and takes no time that counts."""
-    return sum(policy.faults.values()) if isinstance(policy, WirePolicy) else 0
+    """Invocations without an answer: a fault or a cap; neither takes a time that counts."""
+    faults = sum(policy.faults.values()) if isinstance(policy, WirePolicy) else 0
+    return faults + _given_up(policy)
 
 
 def _in_turns(

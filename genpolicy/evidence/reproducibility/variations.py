@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.hosts.kinds import HostedEntry, ProgramEntry
 from genpolicy.candidates.judged import JudgedPolicy
@@ -131,7 +132,7 @@ def trained_otherwise(
     """
     data, found = load_dataset(dataset), []
     for candidate in candidates:
-        policy, count = candidate.load(), counts[candidate.name, candidate.seed]
+        policy, count = AnsweringPolicy(candidate.load()), counts[candidate.name, candidate.seed]
         observations = fixture_observations(data, horizons=horizons, count=count)
         varied = of_threads(policy, observations)
         found += varied.rows(candidate.name, seed=candidate.seed, device=candidate.device)

@@ -125,6 +125,7 @@ class CoverageRow:
         sampler: Name of the sampler.
         steps: Sampler steps.
         sampler_sha256: Settings of the sampler.
+        settings: What else is not as by default, in words; empty where nothing is.
         tolerance: Error of a step that it accepts; None of a sampler with equal steps.
         nfe: Network evaluations of one invocation, counted; the most of any situation.
         situations: Held-out situations.
@@ -136,7 +137,8 @@ class CoverageRow:
         chunk_error: Mean absolute error on held-out windows, normalised units; NaN where a chunk
             of them is no numbers.
         jerk_p95_m_s3: p95 over the same chunks of the largest jerk inside one, m/s^3; likewise.
-        nonfinite: Of the same chunks, those that hold a number that is none.
+        nonfinite: Of the same chunks, those that hold a number that is none, or never came.
+        given_up: Of these, those that were given up at the sampler's `nfe_cap`.
     """
 
     method: str
@@ -144,6 +146,7 @@ class CoverageRow:
     sampler: str
     steps: int
     sampler_sha256: str
+    settings: str
     tolerance: float | None
     nfe: int
     situations: int
@@ -155,6 +158,7 @@ class CoverageRow:
     chunk_error: float
     jerk_p95_m_s3: float
     nonfinite: int
+    given_up: int
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ DECLARED = {
 def asking(data, task, checker, kit, tmp_path):
     audit = kit.write_situations(tmp_path / "audit", [(kit.uuids(data)[8], 4, {})])
     held_out = held_out_situations(audit, data, horizons=kit.HORIZONS)
-    deployment = Deployment(kit.HORIZONS, deadline_s=0.15, samples=2)
+    deployment = Deployment(kit.HORIZONS, deadline_s=0.15, samples=2, replan_lead_rows=3)
     return Asked(data, task, checker, held_out, 2, deployment, root_seed=3)
 
 

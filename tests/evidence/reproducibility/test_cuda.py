@@ -47,7 +47,10 @@ def reloaded(there, dataset, data, kit):
     plan = ReloadPlan(
         task="tabletop_insertion", feasibility=kit.FEASIBILITY, dataset=dataset,
         audit=kit.write_situations(root / "audit", [(n, 4, {}) for n in kit.uuids(data)[8:]]),
-        samples=3, deployment=Deployment(kit.HORIZONS, deadline_s=0.15, samples=4), root_seed=3,
+        samples=3, deployment=Deployment(
+            kit.HORIZONS, deadline_s=0.15, samples=4, replan_lead_rows=3
+        ),
+        root_seed=3,
         sweep={"flow": [1, SamplerConfig(name="midpoint")]},
     )  # fmt: skip
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)

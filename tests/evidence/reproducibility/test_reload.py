@@ -1,17 +1,19 @@
 """Reload and sweep of a barely trained candidate: equal samples, modes counted once."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from gates.reproducibility.identity import unrecorded
 from genpolicy.candidates.judged import trained
-from genpolicy.errors import ContractError
+from genpolicy.data.dataset import load_dataset
+from genpolicy.errors import ContractError, EvaluationCapError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.reproducibility import fixtures, reload
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
-from genpolicy.evidence.reproducibility.sweep import Quality, coverage_row
+from genpolicy.evidence.reproducibility.sweep import Quality, coverage_row, swept_windows
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import (
     PARTS,
@@ -37,7 +39,10 @@ def reloaded(fleet, dataset, data, policy, kit, tmp_path_factory):
     plan = ReloadPlan(
         task="tabletop_insertion", feasibility=kit.FEASIBILITY, dataset=dataset,
         audit=kit.write_situations(root / "audit", situations), samples=3,
-        deployment=Deployment(kit.HORIZONS, deadline_s=0.15, samples=4), root_seed=3,
+        deployment=Deployment(
+            kit.HORIZONS, deadline_s=0.15, samples=4, replan_lead_rows=3
+        ),
+        root_seed=3,
         sweep={"flow": [1, 2, SamplerConfig(name="midpoint"), SamplerConfig(name="euler")]},
     )  # fmt: skip
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
@@ -122,12 +127,55 @@ def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(
     assert read_rows(tmp_path / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 3, 3, 2, 2, 2)]
 
 
+@pytest.mark.parametrize("swept", [True, False])
+def test_a_sampler_that_reaches_its_cap_marks_its_candidate_and_ends_nothing(
+    reloaded, tmp_path, monkeypatch, swept
+):
+    """As a setting of the sweep, and as the candidate's own, whose fixtures were drawn in time.
+
+    Wrong before: the whole stage ended with exit 2, for every candidate.
+    """
+    plan, candidates, folder = reloaded
+    capped = SamplerConfig(name="bosh3", steps=4, tolerance=1e-9, nfe_cap=10)
+    monkeypatch.setattr(reload, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
+    honest = methods.sample_ode
+
+    def hard(velocity, noise, **settings):
+        drawn = honest(velocity, noise, **settings)
+        if settings["steps"] == 2 and bool((drawn[:, 0, 0] > 0.0).any()):
+            raise EvaluationCapError(where="a", found="b", expected="c", action="d")
+        return drawn
+
+    if not swept:
+        monkeypatch.setattr(methods, "sample_ode", hard)
+    plan = replace(plan, sweep={"flow": [capped]} if swept else {})
+    write_reload(plan, candidates, folder.parent / "fixtures.parquet", tmp_path)
+    rows = {row.sampler: row for row in read_rows(tmp_path / "coverage.parquet", CoverageRow)}
+    assert set(rows) == ({"bosh3", "euler"} if swept else {"euler"})
+    given_up = rows["bosh3" if swept else "euler"]
+    assert given_up.given_up == given_up.nonfinite > 0 and math.isnan(given_up.chunk_error)
+    own = CANDIDATES.read(tmp_path)["flow"]
+    assert own.nonfinite_chunks == own.given_up == (0 if swept else given_up.given_up)
+    if swept:
+        assert given_up.admissible_share == given_up.modes_covered_share == 0.0
+        assert given_up.nfe <= 10 and given_up.settings == "nfe_cap 10"
+        assert rows["euler"].given_up == 0 and rows["euler"].chunk_error > 0.0
+    else:
+        offline = read_rows(tmp_path / "offline.parquet", OfflineRow)
+        assert any(math.isnan(row.masked_mae) for row in offline)
+        assert (
+            0
+            < given_up.given_up
+            < len(swept_windows(load_dataset(plan.dataset), plan.horizons).observations)
+        )
+
+
 def test_the_card_says_what_runs(reloaded, data):
     _, (flow,), folder = reloaded
     card, config = CANDIDATES.read(folder)["flow"].card, flow.load().checkpoint.config
     assert (card.sampler, card.sampler_steps, card.evaluations) == ("euler", 2, "2")
     assert (card.eta, card.tolerance) == (None, None) and card.path.startswith("straight path")
-    assert (card.control_rate_hz, card.invocation_rate_hz) == pytest.approx((20.0, 2.5))
+    assert (card.control_rate_hz, card.invocation_rate_hz) == pytest.approx((20.0, 4.0))
     assert (card.candidates, card.selector, card.deadline_s) == (4, "first_admissible", 0.15)
     assert card.dataset == data.manifest_sha256 and card.precision == "float32"
     assert card.parameters == config.parameters["total"] > 0 and card.threads == 1

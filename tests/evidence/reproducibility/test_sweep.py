@@ -18,9 +18,9 @@ from genpolicy.evidence.reproducibility.sweep import (
     jerk_p95_m_s3,
     measure_sweep,
     quality_of,
-    swept_samplers,
     swept_windows,
 )
+from genpolicy.evidence.reproducibility.swept import beside_steps, swept_samplers
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.policy import NetworkPolicy
@@ -87,6 +87,20 @@ def test_a_tolerance_belongs_to_solvers_that_choose_their_steps():
     assert coverage_row([mode], sampler=bosh3, quality=quality).tolerance == 0.01
 
 
+def test_what_a_setting_is_besides_its_steps_is_said_where_it_is_not_as_by_default():
+    said = {
+        "": SamplerConfig(name="ddim", steps=16),
+        "eta 1": SamplerConfig(name="ddim", steps=16, eta=1.0),
+        "clip none": SamplerConfig(name="ddim", steps=16, clip=None),
+        "clip 2, eta 0.5": SamplerConfig(name="ddim", steps=16, clip=2.0, eta=0.5),
+        "population 64": SamplerConfig(name="langevin", steps=4, population=64),
+        "nfe_cap 99": SamplerConfig(name="bosh3", steps=4, tolerance=0.01, nfe_cap=99),
+    }
+    assert {text: beside_steps(sampler) for text, sampler in said.items()} == {
+        text: text for text in said
+    }
+
+
 def test_every_swept_setting_is_timed_under_the_name_that_its_samples_have(
     fleet, dataset, kit, monkeypatch
 ):
@@ -107,6 +121,9 @@ def test_every_swept_setting_is_timed_under_the_name_that_its_samples_have(
     ]
     assert [row.sampler_sha256 for row in rows] == hashes * 2 and len(set(hashes)) == 3
     assert all(row.seconds > 0 and row.candidates == 4 for row in rows)
+    capped = SamplerConfig(name="bosh3", steps=4, tolerance=1e-9, nfe_cap=10)
+    rows = sweep.sweep_latency_rows(plan, [flow], {"flow": [capped]})
+    assert {row.sampler_sha256 for row in rows} == {loaded.sampler_config_hash}, "gave no answer"
     alone = measure_sweep(plan, flow, ())
     assert {row.sampler_sha256 for row in alone} == {loaded.sampler_config_hash}
 

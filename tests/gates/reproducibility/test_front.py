@@ -9,6 +9,8 @@ import pytest
 from editing import cells
 
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.pages.page import gate_page
+from gates.proof import judge
 from gates.reproducibility.front import (
     SWEEP,
     Setting,
@@ -62,6 +64,66 @@ def test_a_setting_that_diverges_is_never_advised_and_never_on_the_front():
     assert FOUR[0].dominates(lost) and not lost.dominates(FOUR[0])
     assert choice(settings, deadline_s=0.15) == choice(FOUR, deadline_s=0.15)
     assert choice([lost], deadline_s=0.15).deploy is None
+
+
+def test_a_cheaper_setting_that_misses_the_deadline_is_said_to():
+    """A median of 2 ms and answers of 300: wrong before, as what saves a millisecond and is better."""
+    cheap = setting("cheap", 0.002, 0.99, answer_s=0.300)
+    kept = setting("kept", 0.003, 0.90, answer_s=0.060)
+    found = choice([cheap, kept], deadline_s=0.15)
+    assert (found.deploy.name, found.cheaper.name) == ("kept", "cheap")
+    assert advice(found, deadline_s=0.15)[1] == (
+        "cheap saves 1 ms and misses the deadline: its answer takes 300 ms; coverage +9 points, "
+        "chunk error +0 %, jerk +0 %."
+    )
+    in_time = advice(choice(FOUR, deadline_s=0.15), deadline_s=0.15)[1]
+    assert "misses" not in in_time
+
+
+def test_settings_of_one_sampler_and_as_many_steps_have_names_of_their_own(repo):
+    """As `ddim` with other noise, or without a bound: wrong before, one name for all of them."""
+    told = {"flow2": "eta 1", "flow4": "clip none"}
+
+    def alike(frame):
+        frame = frame.assign(settings=frame["sampler_sha256"].map(told).fillna(""))
+        frame["tolerance"] = frame["tolerance"].astype(float)
+        frame.loc[frame["sampler_sha256"] == "flow8", "tolerance"] = 0.01
+        return frame.assign(sampler="ddim", steps=16)
+
+    evidence.edit_table(repo, COVERAGE, alike)
+    found = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    assert [one.name for one in found] == [
+        "ddim, 16 steps, eta 1", "ddim, 16 steps, clip none", "ddim, 16 steps, tolerance 0.01",
+        "ddim, 16 steps",
+    ]  # fmt: skip
+    evidence.edit_table(repo, COVERAGE, lambda f: alike(f).assign(settings="", tolerance=None))
+    unsaid = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    assert len({one.name for one in unsaid}) == len(unsaid), (
+        "by their hash where nothing else tells"
+    )
+
+
+def test_a_setting_that_was_always_given_up_is_a_row_without_an_answer(repo):
+    """It has no times, which of one that answered is missing evidence."""
+
+    def capped(frame):
+        own = frame["sampler_sha256"] == "flow4"
+        frame.loc[own, ["nonfinite", "given_up"]] = 30
+        frame.loc[own, ["chunk_error", "jerk_p95_m_s3"]] = math.nan
+        return frame
+
+    evidence.edit_table(repo, COVERAGE, capped)
+    name = SWEEP.removeprefix("artifacts/")
+    evidence.edit_table(repo, name, lambda f: f[f["sampler_sha256"] != "flow4"])
+    found = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    assert [one.name for one in found][-1] == "euler, 4 steps" and len(found) == 4
+    assert (found[-1].given_up, found[-1].answer_s) == (30, math.inf)
+    assert not efficient(found)[-1]
+    chosen = choice(found, deadline_s=1.0)
+    assert found[-1] not in (chosen.deploy, chosen.best, chosen.cheaper)
+    report = judge(repo, "B")
+    page = gate_page(repo, report)
+    assert "no: 30 chunks were given up at its cap" in page and "no answer" in page
 
 
 def test_the_deadline_decides_what_is_asked():

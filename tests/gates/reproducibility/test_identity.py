@@ -64,14 +64,16 @@ def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item
     [("parameters", 99), ("training_seeds", ["1"]), ("dataset", "e" * 64),
      ("action_semantics", "e" * 64), ("observation_semantics", "e" * 64),
      ("observation_horizon", 3), ("prediction_horizon", 17), ("execution_horizon", 9),
-     ("control_rate_hz", 10.0), ("invocation_rate_hz", 20.0), ("split", "e" * 64),
+     ("control_rate_hz", 10.0), ("split", "e" * 64),
      ("evaluations", "4"), ("sampler", "heun"), ("sampler_steps", 2), ("batch_rows", 8)],
 )  # fmt: skip
 def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, value):
     say(ladder, item, value)
     found = unpinned(ladder)
-    # What the file of weights says is said beside what the configuration says.
-    assert found.value == (2 if item == "parameters" else 1)
+    # What the file of weights says is said beside what the configuration says, and the rate of
+    # invocations follows from two others.
+    twice = ("parameters", "control_rate_hz", "execution_horizon")
+    assert found.value == (2 if item in twice else 1)
     assert found.caveat.startswith(f"{item}: {value}, trained as ")
 
 
