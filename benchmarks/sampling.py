@@ -54,7 +54,8 @@ from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 from genpolicy.seeds import counter_noise
 
-PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
+ROOT = Path(__file__).parents[1]
+PARAMS = read_yaml(ROOT / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
 SAMPLER = SamplerConfig(name="ddim", steps=16)
 DIVIDING = SamplerConfig(name="ddim", steps=20)
@@ -231,13 +232,16 @@ def medians(
 
 
 def first_call(folder: Path, way: str, *, count: int, threads: int) -> float:
-    """Wall time of the first call of a way in this process, ms; everything is loaded before."""
+    """Wall time of the first call of a way in this process, its observation encoded, ms.
+
+    Imports, the checkpoint and the session of ONNX Runtime are loaded before.
+    """
     torch.set_num_threads(threads)
     policy = load_policy(folder)
     program = session((folder / PROGRAM).read_bytes(), threads) if way == "onnx" else None
     with torch.inference_mode():
-        own = Contenders(policy, count, program)
         begin = time.perf_counter()
+        own = Contenders(policy, count, program)
         own.ways()[way]()
         return 1e3 * (time.perf_counter() - begin)
 
@@ -253,7 +257,7 @@ def first_calls(
             asked += ["--candidates", str(count)]
             told = subprocess.run(
                 [sys.executable, "-m", "benchmarks.sampling", *asked],
-                capture_output=True, text=True, check=True,
+                cwd=ROOT, capture_output=True, text=True, check=True,
             )  # fmt: skip
             spent[way].append(float(told.stdout))
     return {name: float(np.median(own)) for name, own in spent.items()}
@@ -297,9 +301,11 @@ def measure(args: argparse.Namespace, folder: Path) -> None:
                 if place == 0:
                     print_heads(f"{said} (median of {args.repeats})", list(ways))
                 print_row(str(count), medians(ways, repeats=args.repeats, threads=threads))
+        if not args.first_calls:
+            continue
         timed = [name for name in ways if name != "products"]
         print_heads(f"first call of a process, wall ms (median of {args.first_calls})", timed)
-        for count in args.candidates if args.first_calls else ():
+        for count in args.candidates:
             found = first_calls(
                 folder, timed, count=count, threads=threads, repeats=args.first_calls
             )
