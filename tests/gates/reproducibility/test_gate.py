@@ -257,6 +257,6 @@ def test_chunks_of_its_own_sampler_that_are_no_numbers_fail_a_candidate(ladder):
     assert found.verdict == "FAIL" and "3 chunks of its own sampler" in found.caveat
     evidence.edit_document(ladder, "reload/identity.json", lambda d: d["flow"].update(given_up=3))
     found = answer_of(ladder, "nonfinite_weights")
-    assert found.verdict == "FAIL" and found.value == 3
+    assert found.verdict == "FAIL" and found.measured == 3
     assert "3 were given up at sampler.nfe_cap" in found.caveat
     assert "hold a number that is none" not in found.caveat
