@@ -54,7 +54,7 @@ class Watched:
         allowed: What the thresholds allow in a phase.
         silent: Phases with a score that have no threshold: too few episodes.
         delay_s: Median delay of the alarms counted in `coverage`, s; None without any.
-        cost: Mean cost of a rollout under the stated matrix; None where none is stated.
+        cost: Mean cost of a case (`cases`) under the stated matrix; None where none is stated.
     """
 
     monitor: str
@@ -80,11 +80,13 @@ class Candidate:
 
     Attributes:
         watched: By the order of the table.
-        quiet_cost: Mean cost of a rollout if nothing ever alarmed; None where no matrix is stated.
+        failed_before: Rollouts under a probe that failed before it could be felt: no cases.
+        quiet_cost: Mean cost of a case if nothing ever alarmed; None where no matrix is stated.
         loud_cost: The same if everything did.
     """
 
     watched: tuple[Watched, ...]
+    failed_before: int = 0
     quiet_cost: float | None = None
     loud_cost: float | None = None
 
@@ -116,7 +118,9 @@ def watched_of(evidence: Evidence, settings: StressSettings, candidate: str) -> 
     names = list(dict.fromkeys(rows["monitor"].astype(str)))
     costs = {name: settings.monitor_cost(name) for name in (MISSED, ANSWERED, FALSE)}
     some = rollouts[rollouts["monitor"] == names[0]]
-    failed = ~flags(some, "success")
+    counted = cases(some)
+    failed = ~flags(counted, "success")
+    others = some.drop(counted.index)
     return Candidate(
         tuple(
             _watched(
@@ -128,8 +132,9 @@ def watched_of(evidence: Evidence, settings: StressSettings, candidate: str) -> 
             )
             for name in names
         ),
-        quiet_cost=_cost(failed, np.zeros(len(some), dtype=bool), costs),
-        loud_cost=_cost(failed, np.ones(len(some), dtype=bool), costs),
+        failed_before=len(others) - int(flags(others, "success").sum()),
+        quiet_cost=_cost(failed, np.zeros(len(failed), dtype=bool), costs),
+        loud_cost=_cost(failed, np.ones(len(failed), dtype=bool), costs),
     )
 
 
@@ -156,6 +161,15 @@ def by_rollout(rows: pd.DataFrame) -> pd.DataFrame:
 def felt(rollouts: pd.DataFrame) -> pd.DataFrame:
     """Rollouts under a probe that got as far as where it is felt."""
     return rollouts[(rollouts["family"] != NOMINAL) & rollouts["onset_s"].notna()]
+
+
+def cases(rollouts: pd.DataFrame) -> pd.DataFrame:
+    """Rollouts that say something of a monitor: nominal ones, and those that felt their probe.
+
+    Before a probe can be felt no alarm counts, so that a failure there would be charged to every
+    monitor as one that it missed, and to none that always alarms.
+    """
+    return rollouts[(rollouts["family"] == NOMINAL) | rollouts["onset_s"].notna()]
 
 
 def share(rows: pd.DataFrame, confidence: float) -> Interval:
@@ -196,8 +210,11 @@ def _sentence(found: Candidate) -> str:
     if not own:
         return BLIND
     best = max(own, key=lambda one: -1.0 if math.isnan(one.coverage[0]) else one.coverage[0])
+    count = found.failed_before
+    before = f"{count} failed before the probe could be felt" if count else ""
     if not best.failures:
-        return "no probe made it fail, so that what a monitor would miss was not seen"
+        what = f"under probes {before}, and none after" if before else "no probe made it fail"
+        return f"{what}, so that what a monitor would miss was not seen"
     clock = next(one for one in found.watched if one.monitor == TIME)
     better, controls = found.better_than_controls, " and ".join(found.controls)
     shown = (
@@ -210,6 +227,7 @@ def _sentence(found: Candidate) -> str:
         f"{percent(best.coverage[0])} ({percent(best.coverage[1])} to {percent(best.coverage[2])}),"
         f" more than any other monitor or as many, and the clock before "
         f"{percent(clock.coverage[0])}; {shown}"
+        f"{f'; {before} and are no case' if before else ''}"
     )
 
 
@@ -231,7 +249,7 @@ def _watched(
         for phase in dict.fromkeys(phases["phase"])
     ]
     told = failures[flags(failures, "alarm")] if len(failures) else failures
-    failed = ~flags(rollouts, "success")
+    counted = cases(rollouts)
     seen = set(rows["phase"].astype(str))
     open_ones = thresholds[thresholds["threshold"].isna()]["phase"].astype(str)
     return Watched(
@@ -244,7 +262,7 @@ def _watched(
         allowed=float(numbers(thresholds, "alpha").max()),
         silent=tuple(phase for phase in open_ones if phase in seen),
         delay_s=float(np.median(numbers(told, "delay_s"))) if len(told) else None,
-        cost=_cost(failed, flags(rollouts, "alarm"), costs),
+        cost=_cost(~flags(counted, "success"), flags(counted, "alarm"), costs),
     )
 
 
@@ -253,10 +271,10 @@ def _cost(
     alarmed: Sequence[bool] | np.ndarray,
     costs: dict[str, float | None],
 ) -> float | None:
-    """Mean cost of a rollout; None where a cell of the matrix is not stated."""
+    """Mean cost of a case; None without any, or where a cell of the matrix is not stated."""
     failed, alarmed = np.asarray(failed), np.asarray(alarmed)
     missed, answered, false = (costs[name] for name in (MISSED, ANSWERED, FALSE))
-    if missed is None or answered is None or false is None:
+    if missed is None or answered is None or false is None or len(failed) == 0:
         return None
     total = np.where(failed, np.where(alarmed, answered, missed), np.where(alarmed, false, 0.0))
     return float(total.mean())

@@ -23,11 +23,16 @@ Not imported: every gate would stand on all that the stage runs."""
     always=True,
 )
 def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Starts, by hash of the state after reset, that the candidate and a baseline do not share."""
+    """States after reset, by start, condition and hash, that candidate and baseline do not share.
+
+    Every seed has every planned start in every condition, which is asked before: of so many starts
+    the report speaks, since one start is one draw in however many conditions it is met.
+    """
     own = _starts(evidence, settings, candidate)
     unmatched = {name: len(own ^ _starts(evidence, settings, name)) for name in settings.baselines}
     seeds = rollouts(evidence, settings, candidate)["seed"].nunique()
-    text = f"{len(own)} starts by state hash, {trainings(seeds)}; "
+    starts, conditions = (len({key[place] for key in own}) for place in (1, 0))
+    text = f"{starts} starts in {conditions} conditions by state hash, {trainings(seeds)}; "
     text += ", ".join(f"{name} {n}" for name, n in unmatched.items())
     return Measured(float(sum(unmatched.values())), caveat=text)
 

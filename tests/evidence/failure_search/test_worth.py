@@ -19,4 +19,14 @@ def test_a_success_is_worth_what_it_had_left():
 
 def test_failures_lie_below_and_the_milder_is_lower():
     assert of(False, share=0.1) < of(False, share=0.9) < of(True, duration_s=11.9)
-    assert of(False) == 0.0 and of(True, duration_s=12.5) == 0.0, "never below a failure"
+    assert of(False) == 0.0
+
+
+@pytest.mark.parametrize("ended", [{"duration_s": 12.0}, {"force_peak_n": 40.0},
+                                   {"duration_s": 12.5}])  # fmt: skip
+def test_a_success_with_nothing_left_lies_above_every_failure(ended):
+    """At the time limit, or where a condition has no size, so that every failure is of full size.
+
+    The search only orders: what is equal is a failure as good as a success.
+    """
+    assert of(False, share=1.0) < of(True, **ended) < of(True, duration_s=11.95)

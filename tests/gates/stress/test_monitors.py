@@ -17,6 +17,7 @@ from gates.stress.monitors import (
     NO_AUTHORITY,
     UNWATCHED,
     by_rollout,
+    cases,
     felt,
     share,
     watched_of,
@@ -104,6 +105,61 @@ def test_who_never_got_to_where_a_probe_is_felt_is_no_case(ladder, settings):
         [replace(r, **gone) if r.family == "contact_anomaly" else r for r in cut],
     )
     assert of(ladder, settings).watched[0].failures == 4
+
+
+FAMILY = "contact_anomaly"
+
+
+def never_felt(ladder, *, failing=lambda start: start % 2 == 1, kept=("lighting", FAMILY)):
+    """Rollouts of the family in which friction is felt time out before the insertion."""
+    gone = {"onset_s": None, "score_max": None, "alarm": False, "first_alarm_s": None}
+    found = []
+    for row in read_rows(ladder / ALARMS, MonitorAlarmRow):
+        if row.family not in (*kept, "nominal") or (row.family, row.phase) == (FAMILY, "insert"):
+            continue
+        fails = failing(row.start)
+        ended = {"success": not fails, "outcome": "timeout" if fails else "success"}
+        changed = {**gone, "delay_s": None, **ended} if row.family == FAMILY else {}
+        found.append(replace(row, **changed))
+    write_rows(ladder / ALARMS, MonitorAlarmRow, found)
+    evidence.record(ladder)
+
+
+def test_what_was_never_felt_costs_no_monitor_anything(ladder, settings):
+    """16 cases, of which 4 fail under probes and 2 judged; the 4 others are none, 2 of which fail.
+
+    (4 x 2 + 2 x 10) / 16; never an alarm 6 x 10 / 16; always one (6 x 2 + 10 x 1) / 16. Charged
+    with all 20, whoever always alarms would be excused of two failures that nobody could see.
+    """
+    never_felt(ladder)
+    found = of(ladder, settings)
+    assert found.failed_before == 2
+    assert found.watched[0].cost == pytest.approx(1.75)
+    assert (found.quiet_cost, found.loud_cost) == (pytest.approx(3.75), pytest.approx(1.375))
+    rows = by_rollout(Evidence(ladder).of(ALARMS, MonitorAlarmRow, "flow"))
+    assert len(cases(rows)) == 3 * 16 and len(rows) == 3 * 20
+
+
+def test_failures_before_a_probe_is_felt_are_not_called_no_failures(ladder):
+    """Four of four time out in the approach; nothing that could be felt made it fail."""
+    never_felt(ladder, failing=lambda start: True, kept=(FAMILY,))
+    (said,) = [text for text in judge(ladder, "D").caveats if text.startswith("flow: under")]
+    assert said == (
+        "flow: under probes 4 failed before the probe could be felt, and none after, so that what "
+        "a monitor would miss was not seen."
+    )
+
+
+def test_that_no_probe_made_it_fail_is_said_where_none_did(ladder):
+    never_felt(ladder, failing=lambda start: False, kept=(FAMILY,))
+    said = "flow: no probe made it fail, so that what a monitor would miss was not seen."
+    assert said in judge(ladder, "D").caveats
+
+
+def test_failures_that_are_no_case_are_told_beside_those_that_are(ladder):
+    never_felt(ladder)
+    (said,) = [text for text in judge(ladder, "D").caveats if text.startswith("flow: of 4 fail")]
+    assert said.endswith("; 2 failed before the probe could be felt and are no case.")
 
 
 def test_nothing_run_is_nothing_known(ladder, settings):

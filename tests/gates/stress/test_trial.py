@@ -35,7 +35,10 @@ def test_fewer_starts_than_planned_gives_no_verdict(ladder):
 
 def test_how_many_trainings_a_candidate_had_is_said(ladder):
     said = asked(ladder, unmatched_starts, "flow", gate="D").caveat
-    assert "by state hash, of 1 training seed; " in said
+    conditions = len(settings_of(ladder, "D").perturbations)
+    # A start that is met in each condition is one start.
+    begins = f"{evidence.STARTS} starts in {conditions} conditions by state hash, of 1 training"
+    assert said.startswith(f"{begins} seed; ")
 
     def second(frame):
         return pd.concat([frame, frame[frame["method"] == "flow"].assign(seed=9)])
