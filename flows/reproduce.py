@@ -16,6 +16,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from flows.estimate import estimate
@@ -38,6 +39,14 @@ INFRASTRUCTURE = re.compile(
     r"Unable to acquire lock|is busy, it is being blocked|No space left on device|Disk quota"
     r"|Cannot allocate memory|Resource temporarily unavailable"
 )
+# The exception with which a stage ends when a process that it fanned out to died under it: that of
+# the local pool, and that of a cluster after its own tries.
+DEAD_WORKER = re.compile(r"^(?:\w+\.)*(?:BrokenProcessPool|KilledWorker)\b")
+DIED = (
+    "a worker process died under the stage, as one does that is killed where memory runs out. "
+    "Nothing half written was left, and the stage begins anew. If one dies again, lower "
+    "compute.workers."
+)
 BROKEN_PIPELINE = re.compile(r"^'.*dvc\.(yaml|lock)' (is invalid|is corrupted|validation failed)")
 DVC_REJECTS = re.compile(
     r"is (invalid|corrupted)|validation failed|does not exist|missing data|not found"
@@ -58,6 +67,7 @@ class RunEnd:
         infrastructure: Whether a second try could help: a lock, a full disk, a killed process.
         duration_s: Wall time.
         verdict: Of the last gate, where all ran and it does not pass; otherwise empty.
+        worker_died: Whether it was a process that the stage had fanned out to.
     """
 
     code: int
@@ -66,6 +76,7 @@ class RunEnd:
     infrastructure: bool
     duration_s: float
     verdict: str = ""
+    worker_died: bool = False
 
 
 def reproduce(
@@ -178,7 +189,11 @@ def stop_all() -> None:
 def reproduce_here(
     workspace: Path, *, stages: Sequence[str] = (), single_item: bool = False, force: bool = False
 ) -> int:
-    """`reproduce` for a person at a terminal: prints as it goes, ends with the exit code."""
+    """`reproduce` for a person at a terminal: prints as it goes, ends with the exit code.
+
+    Once, a stage under which a worker died is run again by itself. A lock, a full disk or a stage
+    that somebody ended waits for the person.
+    """
     if not (workspace / "dvc.yaml").is_file():
         raise BadInputError(
             where=str(workspace),
@@ -189,14 +204,19 @@ def reproduce_here(
     if not stages:
         print(estimate(workspace), flush=True)
     signal.signal(signal.SIGTERM, _interrupt)
+    again = partial(
+        reproduce,
+        workspace,
+        stages=stages,
+        single_item=single_item,
+        force=force,
+        echo=lambda line: print(line, flush=True),
+    )
     try:
-        outcome = reproduce(
-            workspace,
-            stages=stages,
-            single_item=single_item,
-            force=force,
-            echo=lambda line: print(line, flush=True),
-        )
+        outcome = again()
+        if outcome.worker_died:
+            print(f"\n{outcome.sentence} Run again, once.\n", file=sys.stderr, flush=True)
+            outcome = again()
     except KeyboardInterrupt:
         print("Interrupted: DVC and its stage were stopped.", file=sys.stderr)
         return INTERRUPTED
@@ -238,9 +258,22 @@ def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> RunEnd:
     if stage_code in (EXIT_BAD_INPUT, EXIT_REFUSED):
         full_disk = stage_code == EXIT_BAD_INPUT and INFRASTRUCTURE.search(sentence) is not None
         return RunEnd(stage_code, stage, sentence, full_disk, duration_s)
+    if _worker_died(stage, lines):
+        said_so = f"{stage}: {DIED}"
+        return RunEnd(EXIT_FAULT, stage, said_so, True, duration_s, worker_died=True)
     # A shell reports a process that a signal ended as 128 + signal (137: killed for memory).
     transient = stage_code < 0 or stage_code > 128 or INFRASTRUCTURE.search(text) is not None
     return RunEnd(EXIT_FAULT, stage, sentence, transient, duration_s)
+
+
+def _worker_died(stage: str, lines: Sequence[str]) -> bool:
+    """Whether the last word of the traceback, before the stage's own, is that of a broken pool.
+
+    An exception that such a death only led to is one of ours until somebody has looked.
+    """
+    own = [place for place, line in enumerate(lines) if line.startswith(f"{stage}: ")]
+    before = [line for line in lines[: own[-1]] if line] if own else []
+    return bool(before) and DEAD_WORKER.match(before[-1]) is not None
 
 
 if __name__ == "__main__":
