@@ -1,6 +1,7 @@
 """What must hold whatever is gained: recovery, the stub, the balance, the independent checker."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -44,56 +45,128 @@ def recovery_success_lower(
     An entry is recovered by its own primitive, after which the policy took over and succeeded
     (`RecoveryRow`). Few entries of a condition cannot show that recovery is good there, so a
     condition is judged where as many starts, had each recovered, would show the limit; but enough
-    failures can show that it is bad: where the upper bound of another condition is lower, it is
+    failures can speak against it: where the upper bound of another condition is lower, it is
     what is measured. What nobody called for is asked over all conditions together too, since a few
     entries in each would never be judged; and a phase may show that it is bad, whatever others do.
+
+    What speaks against one group keeps the gate from a PASS. Of many groups one does so by luck,
+    so that recovery is shown to be bad only where a bound at the level over their number
+    (Bonferroni) lies below the limit: the better end of the interval. In between, more starts
+    decide.
     """
     rows = recoveries(evidence, settings, candidate)
     limit = settings.limits.of.get("recovery_success_lower")
     least = limit.limit if limit and limit.limit is not None else 0.0
     if len(rows) == 0:
         raise MissingEvidenceError("not exercised: recovery began on 0 starts, in any condition")
-    found = []
-    for where, subset, must_show in _groups(rows):
-        part = subset.of(rows)
-        starts = part["start"].nunique()
-        reach, _ = counted_interval(starts, starts, confidence=settings.confidence)
-        enough = must_show and reach >= least
-        # Starts show that it is good; that it is bad, rollouts of one start may show together.
-        together = not enough and part["perturbation"].nunique() > 1
-        units = part["perturbation"] + part["start"].astype(str) if together else part["start"]
-        _, lower, upper = share_interval(
-            RECOVERED.holds(part),
-            units.to_numpy(),
-            confidence=settings.confidence,
-            favourable=enough,  # the count of what is judged at its better end is rounded up
-        )
-        bound, end = (lower, "at worst") if enough else (upper, "at best")
-        recount = subset.counted(part, RECOVERED)
-        share = part_said(recount, "recoveries")
-        counted = f"{units.nunique()} rollouts" if together else f"{starts} starts"
-        text = f"worst in {where}: {share} on {counted}, {end} {percent(bound)}"
-        if enough or bound < least:
-            said = Measured(bound, (lower, upper), text, counted=counted, recount=recount)
-            found.append((bound, said))
+    return shown_by(rows, least=least, confidence=settings.confidence)
+
+
+def shown_by(rows: pd.DataFrame, *, least: float, confidence: float) -> Measured:
+    """What entries into recovery show, in whatever group they show least.
+
+    Args:
+        rows: Entries of one candidate, at least one; columns of `RecoveryRow`.
+        least: The limit.
+        confidence: Coverage of an interval of one group.
+
+    Raises:
+        MissingEvidenceError: They are too few to show anything.
+    """
+    groups = list(groups_of(rows))
+    asked = [
+        group.measured(rows, least=least, among=len(groups), confidence=confidence)
+        for group in groups
+    ]
+    found = [one for one in asked if one is not None]
     if not found:
         most = rows.groupby("perturbation")["start"].nunique().max()
         raise MissingEvidenceError(
             f"hardly exercised: recovery began on at most {most} starts of a condition; had each "
             "recovered, less than the limit were shown"
         )
-    return min(found, key=lambda one: one[0])[1]
+    # What is shown to be bad is not hidden by what is not shown yet.
+    return min(found, key=lambda one: (not one.bad, one.bound)).said
 
 
-def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, Subset, bool]]:
-    """Entries that are judged together, and whether they must show that recovery is good."""
+@dataclass(frozen=True)
+class Found:
+    """What one group shows.
+
+    Attributes:
+        bad: Whether it shows that recovery is below the limit.
+        bound: What is held against the limit.
+        said: The same, as the gate says it.
+    """
+
+    bad: bool
+    bound: float
+    said: Measured
+
+
+@dataclass(frozen=True)
+class Group:
+    """Entries that are judged together.
+
+    Attributes:
+        where: In words.
+        subset: Which they are.
+        must_show: Whether they must show that recovery is good, where they can.
+    """
+
+    where: str
+    subset: Subset
+    must_show: bool
+
+    def measured(
+        self, rows: pd.DataFrame, *, least: float, among: int, confidence: float
+    ) -> Found | None:
+        """What the group shows; None where it is too small for either.
+
+        Args:
+            rows: All entries of a candidate.
+            least: The limit.
+            among: How many groups are looked at.
+            confidence: Coverage of an interval of one group.
+        """
+        part = self.subset.of(rows)
+        starts = part["start"].nunique()
+        reach, _ = counted_interval(starts, starts, confidence=confidence)
+        enough = self.must_show and reach >= least
+        # Starts show that it is good; that it is bad, rollouts of one start may show together.
+        together = not enough and part["perturbation"].nunique() > 1
+        units = part["perturbation"] + part["start"].astype(str) if together else part["start"]
+        recovered, clusters = RECOVERED.holds(part), units.to_numpy()
+        # The count of what is judged at its better end is rounded up.
+        _, lower, upper = share_interval(
+            recovered, clusters, confidence=confidence, favourable=enough
+        )
+        bound, end = (lower, "at worst") if enough else (upper, "at best")
+        against = bound < least
+        if not enough and not against:
+            return None
+        recount = self.subset.counted(part, RECOVERED)
+        share = part_said(recount, "recoveries")
+        counted = f"{units.nunique()} rollouts" if together else f"{starts} starts"
+        text = f"worst in {self.where}: {share} on {counted}, {end} {percent(bound)}"
+        if against:
+            wide = 1.0 - (1.0 - confidence) / among
+            _, _, upper = share_interval(recovered, clusters, confidence=wide, favourable=False)
+            text += f"; as one of {among} groups that are looked at, at best {percent(upper)}"
+        said = Measured(bound, (lower, upper), text, counted=counted, recount=recount)
+        return Found(against and upper < least, bound, said)
+
+
+def groups_of(rows: pd.DataFrame) -> Iterator[Group]:
+    """By condition, by what nobody called for, and by phase; each looked at by itself."""
     for condition in sorted(set(rows["perturbation"])):
-        yield str(condition), within(RECOVERIES, str(condition)), True
+        yield Group(str(condition), within(RECOVERIES, str(condition)), True)
     uncalled = Subset(RECOVERIES, (is_none("perturbation", DRILL),))
     if uncalled.of(rows)["perturbation"].nunique() > 1:
-        yield f"all conditions but {DRILL}", uncalled, True
+        yield Group(f"all conditions but {DRILL}", uncalled, True)
     for phase in sorted(set(rows["phase"])):
-        yield f"phase {phase}", Subset(RECOVERIES, (is_one("phase", str(phase)),)), False
+        of_phase = Subset(RECOVERIES, (is_one("phase", str(phase)),))
+        yield Group(f"phase {phase}", of_phase, False)
 
 
 @criterion(

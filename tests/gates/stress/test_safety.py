@@ -1,5 +1,7 @@
 """Recovery that is exercised and helps; a stub and a balance that are counted, not averaged."""
 
+import re
+
 import evidence
 import pytest
 from asked import asked
@@ -8,6 +10,7 @@ from editing import cells
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.stress import safety
+from gates.verdicts import judge_criterion
 from genpolicy.statistics.intervals import clopper_pearson
 
 ROLLOUTS, N = "stress/rollouts.parquet", evidence.STARTS
@@ -19,6 +22,16 @@ def of(frame):
 
 def recovery(root):
     return asked(root, safety.recovery_success_lower, "flow", gate="D")
+
+
+def among(found):
+    """Coverage of an interval at the level of one of the groups that were looked at."""
+    (groups,) = re.findall(r"as one of (\d+) groups", found.caveat)
+    return 1.0 - 0.05 / int(groups)
+
+
+def verdict_of(found, limit=0.5):
+    return judge_criterion(found.value, limit, ">=", found.interval)
 
 
 def begun(root, condition, starts, successes):
@@ -112,7 +125,8 @@ def test_every_condition_with_starts_enough_must_show_it(ladder):
     begun(ladder, "camera_delay", 16, 10)
     found = recovery(ladder)
     assert found.value == clopper_pearson(10, 16, 0.95)[0] < 0.5
-    assert found.interval == clopper_pearson(10, 16, 0.95)
+    assert found.interval == (found.value, clopper_pearson(10, 16, among(found))[1])
+    assert verdict_of(found) == "INCONCLUSIVE"
 
 
 def test_a_few_failures_in_each_of_many_conditions_are_seen_together(ladder):
@@ -150,6 +164,51 @@ def test_a_phase_in_which_nothing_recovers_is_not_hidden_by_another(ladder):
     found = recovery(ladder)
     assert found.value == clopper_pearson(0, 9, 0.95)[1] < 0.5 <= before.value
     assert found.caveat.startswith("worst in phase leave: ") and "on 9 starts" in found.caveat
+    assert verdict_of(found) == "FAIL"
+
+
+@pytest.mark.parametrize(("failed", "verdict"), [(5, "PASS"), (6, "INCONCLUSIVE"), (9, "FAIL")])
+def test_what_one_of_many_groups_does_by_luck_neither_passes_nor_fails(ladder, failed, verdict):
+    """Six of six fail in one of sixty-four trials of a recovery that helps as often as is asked.
+
+    The report would look at each phase, so that one of several does so oftener. It keeps the gate
+    from a PASS as before, and is no proof.
+    """
+
+    def late(frame):
+        drilled = frame["perturbation"].eq("recovery_drill") & of(frame)
+        return drilled & (frame["start"] >= N - failed)
+
+    evidence.edit_table(ladder, ROLLOUTS, lambda f: f.assign(recovered=f["recovered"] & ~late(f)))
+    evidence.edit_table(
+        ladder,
+        "stress/recoveries.parquet",
+        lambda f: f.assign(phase=f["phase"].mask(late(f), "leave")),
+    )
+    found = recovery(ladder)
+    assert verdict_of(found) == verdict
+    if verdict != "PASS":
+        end = clopper_pearson(0, failed, among(found))[1]
+        assert found.interval == (0.0, end) and (end < 0.5) == (verdict == "FAIL")
+
+
+def test_what_is_not_shown_yet_does_not_hide_a_phase_that_is_shown_to_be_bad(ladder):
+    """Of drills so few recover that it is not shown; in one phase of them none of thirty does."""
+
+    def late(frame):
+        drilled = frame["perturbation"].eq("recovery_drill") & of(frame)
+        return drilled & (frame["start"] >= N - 30)
+
+    begun(ladder, "camera_delay", 7, 3)  # its lower bound is lower than that phase's upper one
+    evidence.edit_table(ladder, ROLLOUTS, lambda f: f.assign(recovered=f["recovered"] & ~late(f)))
+    evidence.edit_table(
+        ladder,
+        "stress/recoveries.parquet",
+        lambda f: f.assign(phase=f["phase"].mask(late(f), "leave")),
+    )
+    found = recovery(ladder)
+    assert clopper_pearson(3, 7, 0.95)[0] < clopper_pearson(0, 30, 0.95)[1] < 0.5
+    assert found.caveat.startswith("worst in phase leave: ") and verdict_of(found) == "FAIL"
 
 
 def test_few_failures_that_show_it_is_bad_are_enough(ladder):
@@ -176,7 +235,9 @@ def test_starts_that_recover_under_one_seed_only_count_to_its_advantage(ladder):
 
     evidence.edit_table(ladder, ROLLOUTS, second)
     found = recovery(ladder)
-    assert found.interval == clopper_pearson(1, 5, 0.95) and found.value == found.interval[1]
+    low, high = clopper_pearson(1, 5, 0.95)
+    assert found.value == high
+    assert found.interval == (low, clopper_pearson(1, 5, among(found))[1])
     assert found.caveat.startswith("worst in camera_delay: 10 % (1 of 10 recoveries) on 5 starts")
 
 
