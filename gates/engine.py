@@ -83,6 +83,7 @@ class GateSpec:
         note: Text behind the diagnosis, where a gate has one.
         decide: Own decision, where the common one does not do.
         said: What the report says of the evidence beside criteria, as caveats.
+        worded: A caveat of the gate in the words that fit its settings, where they matter.
     """
 
     gate: Gate
@@ -96,6 +97,7 @@ class GateSpec:
     note: Callable[[Judged], str] | None = None
     decide: Callable[[Judged], Decision] | None = None
     said: Callable[[Judged], Sequence[str]] | None = None
+    worded: Callable[[Any, str], str] | None = None
 
 
 def judge_gate(spec: GateSpec, root: Path) -> GateReport:
@@ -184,6 +186,7 @@ def judge(
     judged = Judged(evidence, inputs, ruled.answers, ruled.verdict, ruled.candidates)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
+    own = [spec.worded(settings, text) if spec.worded else text for text in spec.caveats]
     beside = (*_waivers(limits), *settings.caveats, *(spec.said(judged) if spec.said else ()))
     return GateReport(
         schema_version=SCHEMA_VERSION,
@@ -198,7 +201,7 @@ def judge(
         pipeline=dict(evidence.basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*map(said, ruled.overrides), *spec.caveats, *beside, *caveats, *lacking),
+        caveats=(*map(said, ruled.overrides), *own, *beside, *caveats, *lacking),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
         decision=f"{decision.text} {aside(ruled.overrides)}".strip(),
         promoted=decision.promoted,

@@ -58,8 +58,10 @@ def _warned(text: str) -> list[str]:
 def _beside(plan: Plan) -> list[str]:
     """What is run and not compared, where there is some."""
     graded, probed, searched = plan.graded_rollouts, plan.probe_rollouts, plan.searched_rollouts
+    further = f"by further training seeds, {plan.further_seeds} of them (policy.seeds),"
     return [
         *([f"{graded:,} beside them of graded sizes (stress.severities),"] if graded else []),
+        *([f"{plan.further_rollouts:,} beside them {further}"] if plan.further_seeds else []),
         *([f"up to {probed:,} after them for the monitors (monitors),"] if probed else []),
         *(
             [f"up to {searched:,} behind the gate for failures (card.failure_search),"]

@@ -26,6 +26,7 @@ from gates.stress.rollouts import NOMINAL, StressSettings
 from gates.stress.trial import reachable
 from gates.stress.weights import listed
 from gates.verdicts import judge_criterion, rounded
+from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.documents.stress import Power
 from genpolicy.evidence.failure_search.settings import search_settings
 from genpolicy.evidence.monitors.settings import MonitorsSettings
@@ -78,6 +79,9 @@ class Plan:
         candidates: Names of those that are registered; alpha is shared between them.
         rollouts: Over all methods and conditions: the comparison.
         graded_rollouts: Beside it, of conditions made harder or milder (`stress.severities`).
+        further_seeds: Training seeds beside the one that is promoted (`policy.seeds`).
+        further_rollouts: The comparison and what is graded beside it once more with each of them,
+            by all that are trained here.
         probe_rollouts: After it, under probes and without, for the stage `monitors`,
             if every registered candidate is admitted.
         searched_rollouts: Behind the gate, where failures of who passed are searched for, if every
@@ -100,6 +104,8 @@ class Plan:
     candidates: tuple[str, ...]
     rollouts: int
     graded_rollouts: int
+    further_seeds: int
+    further_rollouts: int
     probe_rollouts: int
     searched_rollouts: int
     longest_s: float
@@ -142,6 +148,9 @@ def plan_of(root: Path) -> Plan:
     of_condition = len(methods) * settings.planned_starts
     rollouts = of_condition * len(planned.perturbations)
     graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
+    trained = [name for name in methods if name != PLANNER and name not in settings.brought]
+    again = len(trained) * settings.planned_starts * len(planned.conditions)
+    further = len(settings.further_seeds) * again
     probed = len(settings.candidates) * section(params, "monitors", MonitorsSettings).rollouts
     looks = search_settings(params).evaluations * len(planned.perturbations)
     searched = len(settings.candidates) * looks
@@ -158,9 +167,11 @@ def plan_of(root: Path) -> Plan:
         candidates=settings.candidates,
         rollouts=rollouts,
         graded_rollouts=graded,
+        further_seeds=len(settings.further_seeds),
+        further_rollouts=further,
         probe_rollouts=probed,
         searched_rollouts=searched,
-        longest_s=(rollouts + graded + probed + searched) * planned.episode_limit_s,
+        longest_s=(rollouts + graded + further + probed + searched) * planned.episode_limit_s,
         measure=settings.measure,
         weighed=listed(settings.utility),
         margin=settings.margin,

@@ -33,6 +33,7 @@ from gates.rederive_searched import rederive_searched
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.rederive_splices import rederive_splices
+from gates.rederive_trainings import of_training, only_seed, seed_folders
 from gates.report import Gate, read_report, report_path, stage_of
 from gates.settings import PARAMS_FILE, read_params, section_of
 from gates.stated import (
@@ -163,6 +164,7 @@ def _evidence(root: Path, gate: Gate) -> None:
         rederive_distilled(root, training_seed(params))
         _envelope(root, params)
         _power(root, params)
+        _further_trainings(root, params, held_to)
 
 
 def _printed(root: Path, gate: Gate) -> None:
@@ -190,32 +192,61 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
     return expected_settings(held_to), expected_motion(cell, task.action_at, task.scene_poses)
 
 
+def _further_trainings(
+    root: Path, params: Mapping[str, Any], held_to: tuple[ExpectedSettings, ExpectedMotion]
+) -> None:
+    """What further training seeds gave: all that are planned, each held as the first one is.
+
+    Only what no training has a part in is left to the first: planner, clocks, monitors, power.
+    """
+    for seed, folder in seed_folders(root, params).items():
+        journals = sorted((root / folder).glob("journals/*.mcap"))
+        with of_training(seed):
+            own = only_seed(params, seed)
+            rederive_checked(root, "D", folder, held_to, journals)
+            rederive_sessions(root, "D", own, journals)
+            _tables(root, own, held_to[1], journals, folder)
+            rederive_latency(root, own, journals)
+            rederive_disturbance(own, journals)
+            rederive_outcomes(own, journals)
+            rederive_rollout_draws(root, own, journals)
+            rederive_distilled(root, seed, folder=folder)
+            _envelope(root, own, folder)
+
+
 def _tables(
-    root: Path, params: Mapping[str, Any], motion: ExpectedMotion, journals: list[Path]
+    root: Path,
+    params: Mapping[str, Any],
+    motion: ExpectedMotion,
+    journals: list[Path],
+    folder: str = STRESS,
 ) -> None:
     """Every table that journals speak of: each row what they say, and none without the other."""
     seed = training_seed(params)
-    with readable(f"{STRESS}/journals"):
+    with readable(f"{folder}/journals"):
         derived = [derived_with_recoveries(path) for path in journals]
         spliced = Spliced(motion.scene_path)
         refused = RefusedCandidates()
         tables = derived_tables(journals, spliced, refused)
-    written = root / FAULTS
-    stated_faults = read_table(written).to_pylist() if written.is_file() else []
-    _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
+    faults = f"{folder}/{Path(FAULTS).name}"
+    stated_faults = read_table(root / faults).to_pylist() if (root / faults).is_file() else []
+    _faults(params, faults, stated_faults, tables.pop(Path(FAULTS).stem))
     for name, keys, rows in (
         ("rollouts", ROLLOUT, [row for own, _ in derived for row in own.values()]),
         ("recoveries", RECOVERY, [row for _, own in derived for row in own]),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
     ):
-        path = f"{STRESS}/{name}.parquet"
+        path = f"{folder}/{name}.parquet"
         stated = read_table(root / path).to_pylist()
         compare_rows("D", path, keys, stated, rows, seed=seed)
-    rederive_splices(root, params, spliced.rows)
-    rederive_refused(root, params, refused, [row for own, _ in derived for row in own.values()])
+    rederive_splices(root, params, spliced.rows, folder=folder)
+    rollouts = [row for own, _ in derived for row in own.values()]
+    rederive_refused(root, params, refused, rollouts, folder=folder)
 
 
-def _faults(params: Mapping[str, Any], stated: Sequence[Row], derived: Sequence[Row]) -> None:
+def _faults(
+    params: Mapping[str, Any], path: str, stated: Sequence[Row], derived: Sequence[Row]
+) -> None:
     """`faults.parquet`: of policies in a process of their own, and of nobody else."""
     brought = mapping(section_of(params, "candidates"))
     for row in derived:
@@ -223,22 +254,22 @@ def _faults(params: Mapping[str, Any], stated: Sequence[Row], derived: Sequence[
             named = f"fault {row['method']}/{row['perturbation']}/{row['fault']}"
             refuse("D", named, f"{row['count']} of a policy that runs here", "none of it")
     own = [row for row in derived if row["method"] in brought]
-    compare_rows("D", FAULTS, KEYS[Path(FAULTS).stem], stated, own, seed=None)
+    compare_rows("D", path, KEYS[Path(FAULTS).stem], stated, own, seed=None)
 
 
-def _envelope(root: Path, params: Mapping[str, Any]) -> None:
+def _envelope(root: Path, params: Mapping[str, Any], folder: str = STRESS) -> None:
     """`envelope.json`: the planned limits, and how far the commands of each journal went."""
     stress = section(params, "stress", StressSettings)
     planned = stress.perturbations.get(CONDITION)
-    path = root / STRESS / ENVELOPE.file
+    path = root / folder / ENVELOPE.file
     expected: dict[str, Any] = {}
     if isinstance(planned, ReducedEnvelope):
-        journals = (root / STRESS / "journals").glob(f"*__{CONDITION}.mcap")
+        journals = (root / folder / "journals").glob(f"*__{CONDITION}.mcap")
         reached = {journal.name.partition("__")[0]: reach_of(journal) for journal in journals}
         expected = ENVELOPE.plain(envelope_document(CONDITION, planned, reached))
     stated = mapping(read_json(path)) if path.is_file() else {}
     how = "as planned and as the journals say"
-    compare_keys("D", f"{STRESS}/{ENVELOPE.file}", stated, expected, how)
+    compare_keys("D", f"{folder}/{ENVELOPE.file}", stated, expected, how)
 
 
 def _power(root: Path, params: Mapping[str, Any]) -> None:

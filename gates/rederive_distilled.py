@@ -43,23 +43,28 @@ def rederive_costs(root: Path, seeds: Iterable[Path]) -> None:
             _compare(root, "B", seed, mapping(stated))
 
 
-def rederive_distilled(root: Path, seed: object) -> None:
+def rederive_distilled(root: Path, seed: object, *, folder: str = STRESS) -> None:
     """`distilled.json`: what the configuration of every compared candidate with a teacher says.
+
+    Args:
+        root: The workspace.
+        seed: Number of the training seed that was compared.
+        folder: Where the document and the rollouts lie.
 
     Raises:
         RefusedError: It says something else, or is not there.
         BadInputError: A document cannot be read.
     """
-    compared = sorted(set(read_table(root / STRESS / "rollouts.parquet")["method"].to_pylist()))
+    compared = sorted(set(read_table(root / folder / "rollouts.parquet")["method"].to_pylist()))
     expected = {}
     for method in compared:
         path = root / GENERATORS / method / f"seed_{seed}" / "config.json"
         own = mapping(read_json(path)).get("distilled") if path.is_file() else None
         if own is not None:
             expected[method] = own
-    path = root / STRESS / DISTILLED.file
+    path = root / folder / DISTILLED.file
     stated = mapping(read_json(path)) if path.is_file() else {}
-    place = f"{STRESS}/{DISTILLED.file}"
+    place = f"{folder}/{DISTILLED.file}"
     compare_keys("D", place, stated, expected, "as the candidate's configuration says")
 
 

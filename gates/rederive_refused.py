@@ -7,12 +7,14 @@ from types import SimpleNamespace
 from typing import Any
 
 from gates.stated import Row, compare_rows, training_seed
-from gates.stress.rollouts import REFUSED
+from gates.stress.rollouts import STRESS
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.stress.worth import kept_whole
 from genpolicy.integrity.rows import read_columns
 from genpolicy.verification.refused import KEYS, RefusedCandidates, Rollout
+
+TABLE = "refused.parquet"
 
 
 def rederive_refused(
@@ -20,6 +22,8 @@ def rederive_refused(
     params: Mapping[str, Any],
     refused: RefusedCandidates,
     rollouts: Iterable[Row],
+    *,
+    folder: str = STRESS,
 ) -> None:
     """Hold each refused chunk that is kept against the hash that its journal states.
 
@@ -30,15 +34,17 @@ def rederive_refused(
         params: `params.yaml`.
         refused: What the journals say of refused candidates.
         rollouts: What they say of the rollouts.
+        folder: Where the table lies.
 
     Raises:
         RefusedError: A chunk is another one than was judged, is missing, or is too many.
         IntegrityError: The table is no regular file, or has not the columns of its row.
         BadInputError: It cannot be read.
     """
-    stated = [_hashed(row) for row in read_columns(root / REFUSED, RefusedRow).to_pylist()]
+    path = f"{folder}/{TABLE}"
+    stated = [_hashed(row) for row in read_columns(root / path, RefusedRow).to_pylist()]
     derived = list(refused.rows(_kept(rollouts)))
-    compare_rows("D", REFUSED, KEYS, stated, derived, seed=training_seed(params))
+    compare_rows("D", path, KEYS, stated, derived, seed=training_seed(params))
 
 
 def _kept(rollouts: Iterable[Row]) -> set[Rollout]:

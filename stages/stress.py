@@ -6,7 +6,7 @@ from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.contenders import in_comparison
 from genpolicy.data.dataset import load_dataset
-from genpolicy.evidence.documents.stress import POWER
+from genpolicy.evidence.documents.stress import POWER, TRAININGS, Trainings, folder_of_seed
 from genpolicy.evidence.fixtures_again import NO_FIXTURES, brought_fixtures
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
@@ -17,6 +17,7 @@ from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import plan_shards, write_stress
+from genpolicy.evidence.stress.trainings import of_training
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -30,7 +31,12 @@ from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
-    """Admit through gate C, then run every method under every perturbation."""
+    """Admit through gate C, then run every method under every perturbation.
+
+    What was trained with several seeds runs with each, the first in the folder of the stage and
+    every other one in a folder of its own, so that no row of another training is among those that
+    promotion is judged by.
+    """
     admitted = admit("stress", Path.cwd()).candidates
     require_pinned_limits(params, Path.cwd())
     require_one_contract("train_baselines", "train_generators", dataset=False)
@@ -38,7 +44,7 @@ def work(params: Params) -> None:
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     task = load_task(params.task.name)
-    seed = params.section("policy", PolicySettings).seeds[0]
+    seed, *further = params.section("policy", PolicySettings).seeds
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     fixtures = NO_FIXTURES
     if brought:
@@ -66,17 +72,23 @@ def work(params: Params) -> None:
     latency = latency_models(table, timing.declared_terms)
     power = power_document(section, candidates=registered, root_seed=params.seed)
     with output_folder(ARTIFACTS / "stress") as folder:
-        shards = plan_shards(
-            comparison,
-            judged,
-            section.conditions,
-            latency=latency,
-            journals=folder / "journals",
-        )
-        write_stress(
-            folder, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
-        )
+        runs = {folder: judged}
+        runs |= {folder / folder_of_seed(number): of_training(judged, number) for number in further}
+        for place, compared in runs.items():
+            place.mkdir(parents=True, exist_ok=True)
+            shards = plan_shards(
+                comparison,
+                compared,
+                section.conditions,
+                latency=latency,
+                journals=place / "journals",
+            )
+            write_stress(
+                place, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
+            )
         POWER.write(folder, power)
+        if further:
+            TRAININGS.write(folder, Trainings(seeds=further))
         if graded := section.severity_rows:
             write_rows(folder / SEVERITIES, SeverityRow, graded)
 

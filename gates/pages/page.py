@@ -41,6 +41,7 @@ from gates.pages import (
     tables_severity,
     tables_stress,
     tables_survival,
+    tables_trainings,
     tables_variations,
 )
 from gates.pages.card_shown import card_shown
@@ -106,6 +107,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         tables_overruns.DONE,
         tables_faults.FAILED,
         *tables_stress.LISTINGS,
+        *tables_trainings.LISTINGS,
     ),
     "E": (tables_searched.FOUND,),
 }

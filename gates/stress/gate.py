@@ -1,12 +1,13 @@
 """Gate D as a whole: the paired gain, and the decision to promote or to return.
 
 Each candidate meets every simple baseline on identical starts. The paired test and its margin
-are fixed before the run; the cost criteria must hold together with it. All conditions and
-training seeds of one start are averaged for the gain: the start is the unit of independence.
+are fixed before the run; the cost criteria must hold together with it. All conditions of one start
+are averaged for the gain: the start is the unit of independence. The candidate is the checkpoint of
+its first training seed; what further ones say of the method is told and not judged (`trainings`).
 Inside the envelope of the card there must be a gain at all.
 """
 
-from gates.claim import CHECKPOINT_ONLY
+from gates.claim import CHECKPOINT_ONLY, ONE_OF_SEVERAL
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Evidence, MissingEvidenceError
@@ -22,10 +23,17 @@ from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.planned import planner_said
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings
+from gates.stress.trainings import trainings_said
 from gates.stress.utility import mean_worths
 from gates.stress.visited import visited_said
 from gates.stress.weights import listed
 from gates.words import points
+
+AVERAGED = (
+    "Starts are the unit of independence; conditions and seeds of one start are averaged, and "
+    "a gain must be shown inside the envelope too. In another condition it may be lost."
+)
+OF_ONE_TRAINING = AVERAGED.replace("conditions and seeds", "conditions")
 
 
 @criterion(
@@ -94,7 +102,14 @@ def _decide(judged: Judged) -> Decision:
 def _said(judged: Judged) -> list[str]:
     """Of the planner, of what was never touched or visited, of clocks, and of monitors."""
     beside = (planner_said, contact_said, visited_said, clocks_said, monitors_said)
-    return [text for of in beside for text in of(judged)]
+    return [text for of in (trainings_said, *beside) for text in of(judged)]
+
+
+def _worded(settings: StressSettings, caveat: str) -> str:
+    """What is said of the only training is not said where there are further ones."""
+    if not settings.further_seeds:
+        return caveat
+    return {CHECKPOINT_ONLY: ONE_OF_SEVERAL, AVERAGED: OF_ONE_TRAINING}.get(caveat, caveat)
 
 
 GATE = GateSpec(
@@ -107,8 +122,7 @@ GATE = GateSpec(
     caveats=(
         CHECKPOINT_ONLY,
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
-        "Starts are the unit of independence; conditions and seeds of one start are averaged, and "
-        "a gain must be shown inside the envelope too. In another condition it may be lost.",
+        AVERAGED,
         "Every cost and every bound of success holds in each planned condition, not on average.",
         "Only methods matched in data, encoder, horizons, resets and deadlines are compared, but "
         "for those that are named as unmatched.",
@@ -116,4 +130,5 @@ GATE = GateSpec(
     below="C",
     decide=_decide,
     said=_said,
+    worded=_worded,
 )

@@ -16,7 +16,8 @@ from gates.stress.rollouts import DRILL, STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import RecoveryRow
 from genpolicy.statistics.eprocess import gain_interval
 
-RECOVERIES = f"{STRESS}/recoveries.parquet"
+RECOVERED_ROWS = "recoveries.parquet"
+RECOVERIES = f"{STRESS}/{RECOVERED_ROWS}"
 PUSH = "push"
 PERTURBED = (DRILL, PUSH)
 """Conditions that put the arm where the policy did not mean to be, on every start."""
@@ -25,21 +26,26 @@ RECOVERED = is_one("recovered", True)
 """Of an entry into recovery."""
 
 
-def recoveries(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:
+def recoveries(
+    evidence: Evidence, settings: StressSettings, method: str, *, folder: str = STRESS
+) -> pd.DataFrame:
     """Entries into recovery of a method under the planned conditions; none where none began.
+
+    Arguments as of `rollouts`.
 
     Raises:
         MissingEvidenceError: As `rollouts`, or a rollout and its entries differ.
     """
-    rolled = rollouts(evidence, settings, method)
+    rolled = rollouts(evidence, settings, method, folder=folder)
+    path = f"{folder}/{RECOVERED_ROWS}"
     began = rolled[flags(rolled, "recovery_attempted")]
     if np.any(flags(began, "recovered") & ~flags(began, "success")):
         raise MissingEvidenceError("a rollout recovered and did not succeed")
     if len(began) == 0:
-        frame = pd.DataFrame([vars(row) for row in evidence.records(RECOVERIES, RecoveryRow)])
+        frame = pd.DataFrame([vars(row) for row in evidence.records(path, RecoveryRow)])
         own = frame[frame["method"] == method] if len(frame) else frame
     else:
-        own = evidence.of(RECOVERIES, RecoveryRow, method)
+        own = evidence.of(path, RecoveryRow, method)
     if len(own):
         own = own[own["perturbation"].isin(settings.perturbations)]
     stated = dict(zip(_keys(began), flags(began, "recovered"), strict=True))

@@ -19,7 +19,8 @@ from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
-ROLLOUTS = f"{STRESS}/rollouts.parquet"
+ROLLED = "rollouts.parquet"
+ROLLOUTS = f"{STRESS}/{ROLLED}"
 JOURNALS = f"{STRESS}/journals/*.mcap"
 REFUSED = f"{STRESS}/refused.parquet"
 INVOCATIONS = f"{STRESS}/invocations.parquet"
@@ -42,10 +43,15 @@ UNPLANNED = (
 )
 """Said where no planner stands among the simple methods."""
 
+
 Interval = tuple[float, float, float]
 """Share or quantile, lower and upper end."""
 SUCCEEDED = is_one("success", True)
 """Of a rollout."""
+
+
+def _of_one_training(seeds: tuple[int, ...]) -> bool:
+    return len(seeds) < 2
 
 
 class StressSettings(CandidateSettings):
@@ -67,6 +73,8 @@ class StressSettings(CandidateSettings):
         tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
         monitor_costs: By owner: what a cell of the monitors' cost matrix costs, and why; likewise.
         utility: By owner: what a success loses by a cost, and why; without any success is compared.
+        seeds: Numbers of the training seeds; the first is the one that is promoted. Left out of a
+            report where there is one.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -82,6 +90,7 @@ class StressSettings(CandidateSettings):
         "action_period_s": "horizons.action_period_s",
         "maximum_age_s": "execution.maximum_age_s",
         "unmatched": "gate_b.unmatched",
+        "seeds": "policy.seeds",
     }
     whole: ClassVar[frozenset[str]] = frozenset({"maximum_age_s"})
 
@@ -100,6 +109,7 @@ class StressSettings(CandidateSettings):
     tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
     monitor_costs: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
     utility: Annotated[Weights, AfterValidator(require_weights)] = Field(default_factory=dict)
+    seeds: tuple[int, ...] = Field(default=(), exclude_if=_of_one_training)
 
     def tolerance(self, name: str) -> float | None:
         """What the clocks may differ by in one respect; None where nobody has said."""
@@ -127,6 +137,11 @@ class StressSettings(CandidateSettings):
                 for name in sorted(self.unmatched)
             )
         )
+
+    @property
+    def further_seeds(self) -> tuple[int, ...]:
+        """Training seeds beside the one that is promoted."""
+        return self.seeds[1:]
 
     @property
     def measure(self) -> str:
@@ -162,20 +177,29 @@ class StressSettings(CandidateSettings):
         return names
 
 
-def rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:
+def rollouts(
+    evidence: Evidence, settings: StressSettings, method: str, *, folder: str = STRESS
+) -> pd.DataFrame:
     """Rollouts of a method under the planned conditions; do not write into the frame.
+
+    Args:
+        evidence: Of the comparison.
+        settings: Say which conditions and how many starts.
+        method: The method.
+        folder: Where its rollouts lie; those of another training seed lie in another one.
 
     Raises:
         MissingEvidenceError: A condition is missing, has fewer starts than planned, or a rollout
             counts as another end than the one it came to.
     """
     # Most measures of the gate ask for them, each for every method.
-    key = (ROLLOUTS, method, settings.perturbations, settings.planned_starts)
-    return evidence.once(key, lambda: _rollouts(evidence, settings, method))
+    path = f"{folder}/{ROLLED}"
+    key = (path, method, settings.perturbations, settings.planned_starts)
+    return evidence.once(key, lambda: _rollouts(evidence, settings, method, path))
 
 
-def _rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.DataFrame:
-    rows = evidence.of(ROLLOUTS, RolloutRow, method)
+def _rollouts(evidence: Evidence, settings: StressSettings, method: str, path: str) -> pd.DataFrame:
+    rows = evidence.of(path, RolloutRow, method)
     rows = rows[rows["perturbation"].isin(settings.perturbations)]
     absent = sorted(set(settings.perturbations) - set(rows["perturbation"]))
     if absent:

@@ -22,12 +22,17 @@ import pandas as pd
 
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.recoveries import ROLLOUT, recoveries
-from gates.stress.rollouts import StressSettings, rollouts
+from gates.stress.rollouts import STRESS, StressSettings, rollouts
 from gates.stress.weights import DURATION, FALLBACK, RECOVERY, by_cost
 
 
 def utilities(
-    evidence: Evidence, settings: StressSettings, method: str, rows: pd.DataFrame
+    evidence: Evidence,
+    settings: StressSettings,
+    method: str,
+    rows: pd.DataFrame,
+    *,
+    folder: str = STRESS,
 ) -> Array:
     """What each rollout of a method is worth, in [0, 1]; its success where nothing is weighed.
 
@@ -36,6 +41,7 @@ def utilities(
         settings: With the weights.
         method: Whose rollouts these are.
         rows: Rollouts of it. Shape (n,).
+        folder: Where they lie.
 
     Raises:
         MissingEvidenceError: A cost of a success lies outside of the rollout, or, where recovery
@@ -44,7 +50,7 @@ def utilities(
     won = flags(rows, "success")
     worth: Array = won.astype(np.float64)
     for cost, weight in by_cost(settings.utility).items():
-        share = _seconds(evidence, settings, method, rows, cost) / settings.longest_s
+        share = _seconds(evidence, settings, rows, cost, folder) / settings.longest_s
         if not np.all((share[won] >= 0.0) & (share[won] <= 1.0 + 1e-9)):
             raise MissingEvidenceError(
                 f"{method}: a success cost more {cost} than a rollout of {settings.longest_s:g} s "
@@ -77,9 +83,10 @@ def mean_worths(evidence: Evidence, settings: StressSettings) -> dict[str, float
 
 
 def _seconds(
-    evidence: Evidence, settings: StressSettings, method: str, rows: pd.DataFrame, cost: str
+    evidence: Evidence, settings: StressSettings, rows: pd.DataFrame, cost: str, folder: str
 ) -> Array:
-    """How much of a cost each rollout had, s. Shape (n,)."""
+    """How much of a cost each rollout of one method had, s. Shape (n,)."""
+    method = str(rows["method"].iloc[0])
     lasted = numbers(rows, "duration_s")
     if cost == DURATION:
         return lasted
@@ -89,7 +96,7 @@ def _seconds(
             raise MissingEvidenceError(f"{method}: fallback_ticks is no part of ticks")
         return lasted * driven / ticks
     assert cost == RECOVERY, "every cost has its time"
-    entries = recoveries(evidence, settings, method)
+    entries = recoveries(evidence, settings, method, folder=folder)
     if len(entries) == 0:
         return np.zeros(len(rows))
     own = entries.assign(spent_s=numbers(entries, "duration_s")).groupby(ROLLOUT)["spent_s"].sum()

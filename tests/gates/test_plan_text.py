@@ -7,11 +7,15 @@ from gates.planning import Bound, Plan
 SIMPLE = ("bc", "act", "classical_planner")
 
 
-def made(*bounds, gains=(), needed=77, graded=0, probed=0, searched=0, weighed="", simple=SIMPLE):
+def made(
+    *bounds, gains=(), needed=77, graded=0, further=(0, 0), probed=0, searched=0, weighed="",
+    simple=SIMPLE,
+):  # fmt: skip
     return Plan(
         starts=90, methods=8, simple=simple, conditions=("nominal", "push"),
         candidates=("diffusion", "flow"),
-        rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed,
+        rollouts=12_600, graded_rollouts=graded, further_seeds=further[0],
+        further_rollouts=further[1], probe_rollouts=probed,
         searched_rollouts=searched, longest_s=63_000.0,
         measure="utility" if weighed else "success", weighed=weighed, margin=0.05, alpha=0.0125,
         power=0.8, bounds=bounds, gains=gains,
@@ -61,9 +65,12 @@ def test_a_plan_that_can_be_decided_warns_of_nothing():
 
 
 def test_what_is_run_beside_the_comparison_is_said_apart():
-    lines = plan_text(made(graded=5_400, probed=176, searched=1_920)).splitlines()
-    assert lines[1:5] == [
+    lines = plan_text(
+        made(graded=5_400, further=(2, 32_400), probed=176, searched=1_920)
+    ).splitlines()
+    assert lines[1:6] == [
         "5,400 beside them of graded sizes (stress.severities),",
+        "32,400 beside them by further training seeds, 2 of them (policy.seeds),",
         "up to 176 after them for the monitors (monitors),",
         "up to 1,920 behind the gate for failures (card.failure_search),",
         "at most 17.5 h of virtual time",

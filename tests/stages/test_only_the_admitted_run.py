@@ -108,10 +108,55 @@ def test_stress_rolls_out_what_passed_gate_c(
     )
     monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
     stress.work(params)
+    assert not (evidence / "artifacts/stress/trainings.json").exists()
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
     networks = [policy for policy in ran if policy.name != PLANNER]  # it runs on no device
     assert {policy.device for policy in networks} == {ELSEWHERE}
+
+
+def test_stress_rolls_out_every_trained_seed_by_the_same_plan(
+    evidence, stage, params, weightless, monkeypatch
+):
+    """What is trained here, baselines as well; each seed in a folder of its own but the first."""
+    verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    params.raw["policy"]["seeds"] = [4, 0, 7]
+    planned, written = [], []
+    without(monkeypatch, stress, "require_one_contract", "load_task", "Comparison")
+    models = object()
+    monkeypatch.setattr(stress, "latency_models", lambda *_: models)
+    monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    monkeypatch.setattr(
+        stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
+    )
+
+    def shards(comparison, who, conditions, *, latency, journals):
+        planned.append((comparison, tuple(conditions), latency, journals.parent))
+        return who
+
+    monkeypatch.setattr(stress, "plan_shards", shards)
+    monkeypatch.setattr(
+        stress, "write_stress", lambda place, who, **_: written.append((place, who))
+    )
+    stress.work(params)
+    first, *further = [who for _, who in written]
+    trained_here = [one.name for one in first if one.name != PLANNER]
+    assert {one.seed for one in first if one.name != PLANNER} == {4}
+    assert [{one.seed for one in who} for who in further] == [{0}, {7}]
+    assert all([one.name for one in who] == trained_here for who in further)
+    for who in further:
+        same = [one for one in first if one.name != PLANNER]
+        for one, other in zip(same, who, strict=True):
+            assert one.folder.parent == other.folder.parent
+            assert other.folder.name == f"seed_{other.seed}"
+    places = [place for place, _ in written]
+    assert [place.relative_to(places[0]).as_posix() for place in places] == [
+        ".", "seeds/0", "seeds/7"
+    ]  # fmt: skip
+    assert places == [journals for *_, journals in planned]
+    assert all(one[1:3] == (planned[0][1], models) for one in planned)
+    document = json.loads((evidence / "artifacts/stress/trainings.json").read_text())
+    assert document == {"seeds": [0, 7]}
 
 
 @pytest.mark.parametrize("failed", [None, *ALL])

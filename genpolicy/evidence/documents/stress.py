@@ -1,4 +1,4 @@
-"""`power.json`, `envelope.json` and `distilled.json` of the matched comparison."""
+"""`power.json`, `envelope.json`, `distilled.json` and `trainings.json` of the comparison."""
 
 from dataclasses import dataclass
 
@@ -44,8 +44,29 @@ class Envelope:
     reached: dict[str, Reached]
 
 
+@dataclass(frozen=True)
+class Trainings:
+    """Which trainings were rolled out beside those that may be promoted.
+
+    Attributes:
+        seeds: Numbers of their training seeds, in the order of `policy.seeds`.
+    """
+
+    seeds: list[Count]
+
+
 POWER = Document("power.json", Power)
 ENVELOPE = Document("envelope.json", Envelope)
 """Missing where no condition ran inside an envelope."""
 DISTILLED = Document("distilled.json", dict[str, Distilled])
 """By method, of those that have a teacher; missing where none has."""
+TRAININGS = Document("trainings.json", Trainings)
+"""Missing where one training seed is planned; see `folder_of_seed`."""
+
+
+def folder_of_seed(seed: int) -> str:
+    """Folder of what the comparison gave with a further training seed, below that of the first.
+
+    Its tables and journals have the names and the form of those of the first seed.
+    """
+    return f"seeds/{seed}"

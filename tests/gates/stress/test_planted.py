@@ -11,15 +11,17 @@ from pathlib import Path
 
 import evidence
 import numpy as np
-import pandas as pd
 import pytest
 from asked import found_in, settings_of
 from editing import cells
+from trained_more import trained_more
 
 from gates.claim import CHECKPOINT_ONLY
 from gates.evidence import Evidence
+from gates.pages.page import gate_page
 from gates.proof import judge
 from gates.stress.pairs import paired_differences
+from gates.stress.trainings import UNCLAIMED
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
@@ -102,26 +104,17 @@ def frozen(root):
     wins(root, FLOW, lambda start: start % 5 < 2)
 
 
+def of_five(brilliant):
+    """One training succeeds always, four are worth the simple policies; the first is promoted."""
+
+    def won(seed):
+        return lambda start: (start % 2 == 0) | (seed == brilliant)
+
+    return {(FLOW, seed): won(seed) for seed in range(5)}
+
+
 def one_of_five(root):
-    """One training succeeds always, four are worth the simple policies."""
-    for name in TABLES:
-
-        def copies(frame):
-            more = [frame[own(frame)].assign(seed=seed) for seed in range(1, 5)]
-            return pd.concat([frame, *more], ignore_index=True)
-
-        evidence.edit_table(root, name, copies)
-    evidence.edit_table(root, ROLLOUTS, of_five)
-
-
-def of_five(frame):
-    won = np.where(frame["seed"] == 0, True, frame["start"] % 2 == 0)
-    success = np.where(own(frame), won, frame["success"]).astype(bool)
-    return frame.assign(
-        success=success,
-        outcome=np.where(success, "success", np.where(own(frame), "timeout", frame["outcome"])),
-        recovered=success & frame["recovery_attempted"],
-    )
+    trained_more(root, of_five(brilliant=3), seeds=range(5))
 
 
 @dataclass(frozen=True)
@@ -204,6 +197,20 @@ def test_one_seed_of_five_of_which_one_is_run_passes_and_the_report_says_of_what
     assert CHECKPOINT_ONLY in report.caveats
     (starts,) = [c for c in found_in(report, "unmatched_starts") if c.candidate == FLOW]
     assert "of 1 training seed;" in starts.caveat
+
+
+def test_brilliant_with_the_first_of_five_is_a_checkpoint_and_no_method(ladder):
+    """It is named before a rollout and is as good as it looks; of its method nothing is claimed."""
+    trained_more(ladder, of_five(brilliant=0), seeds=range(5))
+    report = judge(ladder, "D")
+    assert report.candidates[FLOW] == "PASS"
+    (said,) = [text for text in report.caveats if text.startswith(f"This method, {FLOW}:")]
+    spread = "5 trainings are worth 1, 0.5, 0.5, 0.5, 0.5 in success"
+    apart = "22.4 points"  # standard deviation of these five
+    assert spread in said and f"with {apart} of standard deviation" in said
+    assert UNCLAIMED in said and "1 of 5 trainings gain more than the margin" in said
+    page = gate_page(ladder, report)
+    assert "1, 0.5, 0.5, 0.5, 0.5" in page and apart in page
 
 
 def test_no_demonstration_begins_where_the_comparison_begins():
