@@ -13,7 +13,7 @@ from pydantic import Field
 from securesystemslib.signer import SSlibKey  # type: ignore[attr-defined]
 
 from gates.card.keys import key_weakness
-from gates.card.names import as_read, disguise
+from gates.card.names import as_drawn, as_read, disguise
 from gates.report import OWNERS, StrictModel, parse_section
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
@@ -91,11 +91,20 @@ def load_allow_list(root: Path) -> AllowList:
             address or name that appears twice.
     """
     found = parse_section(AllowList, read_yaml(root / ALLOW_LIST), where=ALLOW_LIST)
+    for person in found.people:
+        if looks := disguise(person.name):
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: name of {person.id}",
+                found=looks,
+                expected="a name that a reader sees as it is written",
+                action="Write the name in its usual letters.",
+            )
     for what, values in (
         ("id", [person.id for person in found.people]),
         ("public_key", [person.public_key for person in found.people]),
         ("emails", [mail.casefold() for person in found.people for mail in person.emails]),
         ("name", [as_read(person.name) for person in found.people]),
+        ("name", [as_drawn(person.name) for person in found.people]),
     ):
         if len(set(values)) != len(values):
             raise ConfigError(
@@ -106,13 +115,6 @@ def load_allow_list(root: Path) -> AllowList:
                 "apart in their names.",
             )
     for person in found.people:
-        if looks := disguise(person.name):
-            raise ConfigError(
-                where=f"{ALLOW_LIST}: name of {person.id}",
-                found=looks,
-                expected="a name that a reader sees as it is written",
-                action="Write the name in its usual letters.",
-            )
         weakness = key_weakness(bytes.fromhex(person.public_key))
         if weakness:
             raise ConfigError(

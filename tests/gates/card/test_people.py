@@ -3,7 +3,7 @@
 import pytest
 import yaml
 from team import AUTHORS, PEOPLE
-from test_names import LOOKS_LIKE_RITA_RAY
+from test_names import LOOKS_LIKE_ADA_LI, LOOKS_LIKE_RITA_RAY
 
 from gates.card.people import Person, dependence, load_allow_list, spotting
 from genpolicy.errors import ConfigError
@@ -59,6 +59,19 @@ def test_two_names_that_read_alike_are_told_apart_or_refused(team, name):
     people[-1]["name"] = f"{name} of the south wing"
     _write(team.root, people)
     assert load_allow_list(team.root).find("ada") is not None
+
+
+@pytest.mark.parametrize("name", [*LOOKS_LIKE_ADA_LI.values(), "Ada Ll"])
+def test_two_real_names_that_look_alike_do_not_stand_on_one_list(team, name):
+    """Each alone is accepted: people are named so."""
+    people = _people(team.root)
+    people[0]["name"], people[-1]["name"] = "Rita Ray", name
+    _write(team.root, people)
+    assert load_allow_list(team.root).find("ada") is not None
+    people[0]["name"] = "Ada LI" if name == "Ada Ll" else "Ada Li"
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=r"name is the same value twice"):
+        load_allow_list(team.root)
 
 
 def test_an_author_is_one_whatever_the_name(team):
