@@ -23,11 +23,13 @@ def reports_of(place: str, root: Path) -> dict[Gate, GateReport]:
     folder = Path(place)
     texts = _of_folder(folder) if folder.is_dir() else _of_revision(place, root)
     if not texts:
+        there = folder.is_dir() or _is_revision(place, root)
         raise BadInputError(
             where=place,
-            found="without a report of a gate" if folder.is_dir() else "no folder and no revision",
+            found="without a report of a gate" if there else "no folder and no revision",
             expected=f"a checkout, a folder with {Path(report_path('A')).name}, or a commit",
-            action="Name two runs, as in `genpolicy report diff HEAD~1 reports`.",
+            action="Name two runs, as in `genpolicy report diff HEAD~1 reports`. Of a branch that "
+            "holds no reports yet there is nothing to compare with.",
         )
     return {gate: parse_report(data, gate=gate) for gate, data in texts.items()}
 
@@ -43,10 +45,14 @@ def _of_folder(folder: Path) -> dict[Gate, bytes]:
 
 
 def _of_revision(revision: str, root: Path) -> dict[Gate, bytes]:
-    if git(root, "rev-parse", "--verify", "-q", "--end-of-options", revision) is None:
+    if not _is_revision(revision, root):
         return {}
     texts = {
         gate: git(root, "show", "--end-of-options", f"{revision}:./{report_path(gate)}")
         for gate in GATES
     }
     return {gate: text.encode() for gate, text in texts.items() if text is not None}
+
+
+def _is_revision(text: str, root: Path) -> bool:
+    return git(root, "rev-parse", "--verify", "-q", "--end-of-options", text) is not None

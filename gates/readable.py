@@ -34,6 +34,8 @@ UNITS: tuple[tuple[str, str], ...] = (
     ("_m", "m"),
     ("_n", "N"),
 )
+NO_SHARE = 1e9
+"""Percent from which on a limit of a share is one in name only, as rehearsals have; spelled out."""
 MOST_TYPED = 6
 """Digits of a limit that somebody typed; one that is derived, like 1 / alpha, may have more."""
 MOST_DIGITS = 12
@@ -106,6 +108,7 @@ def _in_unit(answer: Answer, value: float, digits: int) -> str:
         return f"{text} {suffix.removesuffix('s') if text == '1' else suffix}"
     if answer.id.endswith(EVIDENCE) or RATIO in answer.id:
         return f"×{text}" if RATIO in answer.id else f"{text} to 1"
-    if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
-        return percent(value, digits=digits)
+    if answer.id.endswith(RATES) and answer.threshold is not None:
+        loose = abs(100 * value) >= NO_SHARE
+        return f"{100 * value:,.0f} %" if loose else percent(value, digits=digits)
     return number(value, digits=digits)

@@ -67,8 +67,10 @@ class AbortWindow(StrictModel):
         """Where the candidate's own rollouts stand to it."""
         if not self.seen:
             return "not tried inside the envelope, where there are fewer rollouts"
-        of = f"runs of {self.count:,} rollouts" if self.unit == "trials" else "rollouts"
-        return f"above what is proposed in {self.above:,} of {self.seen:,} {of} inside the envelope"
+        runs = self.unit == "trials" and self.count > 1
+        of = f"runs of {self.count:,} rollouts" if runs else "rollouts"
+        above = f"{self.above:,}" if self.above else "none"
+        return f"above what is proposed in {above} of {self.seen:,} {of} inside the envelope"
 
 
 def windows_of(

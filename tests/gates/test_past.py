@@ -45,6 +45,17 @@ def test_what_is_neither_folder_nor_revision_is_named(checkout, place):
     assert not (checkout / "x").exists()
 
 
+def test_a_revision_without_reports_is_one(checkout):
+    """A branch that a ladder is brought into for the first time exists, and has none."""
+    git = ["git", "-C", str(checkout), "-c", "user.name=a", "-c", "user.email=a@b.example"]
+    subprocess.run([*git, "checkout", "-q", "--orphan", "bare"], check=True)
+    subprocess.run([*git, "commit", "-qm", "none", "--allow-empty"], check=True)
+    subprocess.run([*git, "rm", "-qr", "--cached", "."], check=True)
+    subprocess.run([*git, "commit", "-qm", "none", "--allow-empty"], check=True)
+    with pytest.raises(BadInputError, match="bare is without a report of a gate"):
+        reports_of("bare", checkout)
+
+
 def test_a_folder_without_reports_is_named(checkout):
     (checkout / "empty").mkdir()
     with pytest.raises(BadInputError, match="without a report of a gate"):

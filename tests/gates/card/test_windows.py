@@ -115,6 +115,8 @@ def test_a_window_is_read_as_a_sentence():
     assert window.tried == "above what is proposed in 1 of 30 rollouts inside the envelope"
     trials = window.model_copy(update={"unit": "trials", "count": 5})
     assert "1 of 30 runs of 5 rollouts" in trials.tried
+    single = trials.model_copy(update={"count": 1, "above": 0, "seen": 3})
+    assert single.tried == "above what is proposed in none of 3 rollouts inside the envelope"
 
 
 def test_without_rollouts_inside_the_envelope_nothing_is_proposed(ladder):

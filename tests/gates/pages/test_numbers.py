@@ -43,6 +43,11 @@ def of(**changes):
         ("promotion_e_value", 60, 59.99, "59.99 to 1"),
         ("admissible_share", 0.9975, 0.9975, "99.75 %"),
         ("promotion_e_value", 100 / 3, 100 / 3, "33.3 to 1"),
+        ("told_share", 1e9, 0.70804, "70.8 %"),
+        ("told_share", 1e9, 1e9, "100,000,000,000 %"),
+        ("mode_success_lower", -1e9, -1e9, "-100,000,000,000 %"),
+        ("mode_success_lower", -1e9, 0.7, "70 %"),
+        ("parameter_budget_deviation", 1.5, 1.2, "120 %"),
     ],
 )
 def test_numbers_stand_in_the_unit_of_a_person(name, limit, value, text):
