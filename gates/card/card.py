@@ -247,6 +247,11 @@ def missing_fields(card: TrialCard) -> list[str]:
     return sorted({*empty, *silent, *short, *nobody, *reports} - {"caveats"})
 
 
+def undrafted(card: TrialCard) -> list[str]:
+    """Fields among those that are empty which the draft fixes: no person can fill them in."""
+    return [name for name in missing_fields(card) if name in FIXED]
+
+
 def envelope_violations(card: TrialCard, draft: TrialCard, simulated: Simulated) -> list[str]:
     """Limits of the card that are not those of the simulated envelope, or impossible.
 

@@ -100,7 +100,7 @@ def fill(
     told at once. Without a terminal every answer must be given by --set.
     """
     from gates.card.card import card_bytes
-    from gates.card.filling import filled, rules_of
+    from gates.card.filling import filled, require_fillable, rules_of
     from gates.exceptions import utc_today
     from genpolicy.errors import ConfigError
     from genpolicy.integrity.atomic import write_bytes
@@ -113,6 +113,7 @@ def fill(
             action="Name another file, or remove the old card.",
         )
     rules = rules_of(root, utc_today())
+    require_fillable(rules)
     answers = dict(_pair(text) for text in given or [])
     if sys.stdin.isatty():
         answers = _asked(rules, answers)

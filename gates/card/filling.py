@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gates.card.card import TrialCard, missing_fields, validity
+from gates.card.card import TrialCard, undrafted, validity
 from gates.card.judge import CardGateSettings
 from gates.card.people import (
     ALLOW_LIST,
@@ -24,7 +24,7 @@ from gates.card.people import (
     load_allow_list,
     spotting,
 )
-from gates.card.signing import read_draft
+from gates.card.signing import read_draft, require_no_rehearsal
 from gates.floors import HARDEST_CONTACT_N
 from gates.report import stage_of
 from gates.settings import read_params, read_settings
@@ -37,6 +37,14 @@ ABORT = "abort."
 """Prefix of an abort threshold among the answers."""
 NOT_ASKED = "Leave it out: what is not asked is fixed by the draft, or drawn."
 REDRAFT = "Complete section `card` of params.yaml, then draft again: `dvc repro card`."
+NAME_AUTHORS = (
+    f"Name who made the candidate in `params.yaml: card.authors`, by ids of {ALLOW_LIST}, have it "
+    "reviewed and committed; then draft again: `dvc repro card`."
+)
+LIST_AUTHORS = (
+    f"Have the entry of every author committed to {ALLOW_LIST}, in review; who does not belong "
+    "there is taken from `params.yaml: card.authors`, and the card drafted again."
+)
 LOWER = "Give a number of that range; another limit is planned, and run, before."
 
 
@@ -113,8 +121,9 @@ def filled(rules: Rules, answers: Mapping[str, str]) -> TrialCard:
 
     Raises:
         ConfigError: An answer to nothing that is asked, one that does not hold, or none at all
-            where there is no default.
+            where there is no default; a draft that nobody can complete.
     """
+    require_fillable(rules)
     asked = {question.name: question for question in questions(rules)}
     if unknown := sorted(set(answers) - set(asked)):
         raise _refused(unknown[0], "not asked", f"one of {', '.join(asked)}", NOT_ASKED)
@@ -134,12 +143,31 @@ def filled(rules: Rules, answers: Mapping[str, str]) -> TrialCard:
             thresholds[name.removeprefix(ABORT)] = value
         else:
             values[name] = value
-    card = rules.draft.model_copy(update={**values, "abort_thresholds": thresholds})
-    if missing := missing_fields(card):
+    return rules.draft.model_copy(update={**values, "abort_thresholds": thresholds})
+
+
+def require_fillable(rules: Rules) -> None:
+    """Refuse a draft that no answers complete, before anybody is asked.
+
+    Raises:
+        ConfigError: A field is empty that the draft fixes, an author is not on the list, or nobody
+            on it may review.
+    """
+    if lacking := undrafted(rules.draft):
+        name = lacking[0]
+        action = NAME_AUTHORS if name == "authors" else REDRAFT
+        raise _refused(name, "empty in the draft", "what the ladder and params.yaml give", action)
+    unknown = [name for name in rules.draft.authors if rules.allowed.find(name) is None]
+    if unknown:
+        raise _refused("authors", f"{unknown[0]!r}", f"ids of people on {ALLOW_LIST}", LIST_AUTHORS)
+    people = [person.id for person in rules.allowed.people if person.role == REVIEWER]
+    if not set(people) - set(rules.draft.authors):
         raise _refused(
-            missing[0], "empty in the draft", "what the ladder and params.yaml give", REDRAFT
+            "reviewer",
+            f"nobody: {ALLOW_LIST} lists no {REVIEWER} who did not make the candidate",
+            f"at least one {REVIEWER} there",
+            BE_LISTED,
         )
-    return card
 
 
 def answer(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> Any:
@@ -258,7 +286,9 @@ def rules_of(root: Path, today: datetime.date) -> Rules:
     """What answers are held against in a workspace.
 
     Raises:
-        BadInputError: No draft, no allow-list, or section `gate_e` is wrong.
+        BadInputError: This is a rehearsal, of which no card can be signed; no draft, no allow-list,
+            or section `gate_e` is wrong.
     """
+    require_no_rehearsal(root)
     settings = read_settings(read_params(root), stage_of("E"), CardGateSettings)
     return Rules(read_draft(root), load_allow_list(root), today, settings.maximum_days)

@@ -5,7 +5,7 @@ Without a signed card the verdict is PENDING_REVIEW. Only people's signatures le
 
 import datetime
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -36,14 +36,14 @@ from gates.card.signing import (
 )
 from gates.card.windows import require_aborts, windows_of
 from gates.criterion import Measured, criteria_of, criterion
-from gates.engine import GateSpec, judge, recorded_evidence
+from gates.engine import Decision, GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.exceptions import unmatched_written, utc_today
 from gates.overriders import first_end, require_in_force
 from gates.overrides import OVERRIDES, Exceptions, exceptions_of
 from gates.pipeline import check_record
 from gates.preregistration import PREREGISTRATION, moved_caveats
-from gates.protection import require_protection
+from gates.protection import REHEARSED, require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.reproducibility.settings import RELOAD
 from gates.running import require_running_code
@@ -51,6 +51,8 @@ from gates.settings import GateSettings, read_limits, read_params, read_settings
 from gates.stress.contact import untouched
 from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
+
+NOBODY_SIGNS = Decision("Wait for nobody: no card of a rehearsal can be signed.")
 
 
 class CardGateSettings(GateSettings):
@@ -119,8 +121,9 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     dossier = Dossier(settings, papers, error, day, until)
     limits = read_limits(params, "E", GATE.criteria)
     evidence = recorded_evidence(root, "E")
+    spec = replace(GATE, decide=lambda _: NOBODY_SIGNS) if REHEARSED in caveats else GATE
     report = judge(
-        GATE, evidence, limits, settings, given=dossier, caveats=caveats, exceptions=exceptions
+        spec, evidence, limits, settings, given=dossier, caveats=caveats, exceptions=exceptions
     )
     check_record(root, "E", report.materials)
     require_running_code(root)

@@ -188,10 +188,12 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
     return target
 
 
-def _signer(
-    root: Path, key_file: Path, reviewer: str
-) -> tuple[AllowList, Person, Ed25519PrivateKey]:
-    """Who may sign, who is about to, and with which key; refused before any card is read."""
+def require_no_rehearsal(root: Path) -> None:
+    """Refuse a ladder of which no card can ever be signed.
+
+    Raises:
+        ConfigError: It is a rehearsal, or `params.yaml` is malformed.
+    """
     if is_rehearsal(read_params(root)):
         raise refused(
             PARAMS_FILE,
@@ -199,6 +201,13 @@ def _signer(
             "a ladder whose limits protect people",
             "Sign the card of a ladder without `rehearsal: true`; of a rehearsal none is signed.",
         )
+
+
+def _signer(
+    root: Path, key_file: Path, reviewer: str
+) -> tuple[AllowList, Person, Ed25519PrivateKey]:
+    """Who may sign, who is about to, and with which key; refused before any card is read."""
+    require_no_rehearsal(root)
     if read_plan(root) is None:
         raise refused(
             PREREGISTRATION,

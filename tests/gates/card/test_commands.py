@@ -11,6 +11,7 @@ from gates.card.commands import card
 from gates.card.people import Person
 from gates.card.signing import read_draft
 from genpolicy.cli.shell import run_program
+from genpolicy.integrity.documents import canonical_json
 
 TODAY = "2026-11-21"
 ASKED = ["30", "measured here", "sam", "hand button to drive enable", "rita", "", "2026-11-30"]
@@ -96,6 +97,15 @@ def test_what_was_given_is_not_asked_again(run, team, tmp_path):
     code, out, _ = run("fill", "--out", tmp_path / "card.json", *answers(), typed=typed)
     assert code == 0
     assert "who stands at the stop" not in out
+
+
+def test_of_a_draft_that_nobody_can_complete_nothing_is_asked(run, team, tmp_path):
+    """With the authors that params.yaml ships, which are none, no answer would ever hold."""
+    path = team.root / "artifacts/card/card.json"
+    path.write_bytes(canonical_json({**json.loads(path.read_bytes()), "authors": []}))
+    code, out, err = run("fill", "--out", tmp_path / "card.json", typed=ASKED)
+    assert code == 2 and "force_limit_n" not in out
+    assert "the card's authors is empty in the draft" in err and "card.authors" in err
 
 
 def test_an_old_card_is_not_replaced(run, tmp_path):

@@ -5,10 +5,18 @@ import pytest
 from team import FILLED, TODAY
 
 from gates.card.card import card_bytes
-from gates.card.filling import NONCE_BYTES, Rules, answer, filled, questions, rules_of
+from gates.card.filling import (
+    NONCE_BYTES,
+    Rules,
+    answer,
+    filled,
+    questions,
+    require_fillable,
+    rules_of,
+)
 from gates.card.people import load_allow_list
 from gates.card.signing import read_draft, sign_card
-from genpolicy.errors import ConfigError
+from genpolicy.errors import BadInputError, ConfigError
 
 ANSWERS = {
     name: str(FILLED[name])
@@ -174,6 +182,37 @@ def test_nothing_without_a_default_is_answered_for_a_person(rules, name):
 def test_what_the_draft_fixes_cannot_be_answered(rules, name):
     with pytest.raises(ConfigError, match=f"the card's {name} is not asked"):
         filled(rules, {**ANSWERS, name: "1"})
+
+
+def test_a_rehearsal_is_refused_before_anything_is_asked(team):
+    params = team.root / "params.yaml"
+    params.write_text("rehearsal: true\n" + params.read_text())
+    with pytest.raises(BadInputError, match=r"params\.yaml is a rehearsal") as refused:
+        rules_of(team.root, TODAY)
+    assert "of a rehearsal none is signed" in refused.value.action
+
+
+@pytest.mark.parametrize(
+    ("authors", "people", "where", "action"),
+    [
+        ((), None, "authors is empty in the draft", "params.yaml: card.authors"),
+        (("ada", "eve"), None, "authors is 'eve'", "Have the entry of every author committed"),
+        (("ada",), ("mo", "ada"), "reviewer is nobody", "genpolicy card keygen"),
+        (("ada", "rita"), None, "reviewer is nobody", "genpolicy card keygen"),
+    ],
+)
+def test_a_draft_that_no_answers_complete_is_refused_first(rules, authors, people, where, action):
+    """As shipped: whoever was named as reviewer was refused, one after the other."""
+    allowed = rules.allowed
+    if people is not None:
+        kept = tuple(person for person in allowed.people if person.id in people)
+        allowed = allowed.model_copy(update={"people": kept})
+    draft = rules.draft.model_copy(update={"authors": authors})
+    for ask in (require_fillable, lambda rules: filled(rules, ANSWERS)):
+        with pytest.raises(ConfigError, match=f"the card's {where}") as refused:
+            ask(replace(rules, draft=draft, allowed=allowed))
+        assert action in refused.value.action
+    require_fillable(rules)
 
 
 def test_the_rules_are_those_of_the_workspace(team):
