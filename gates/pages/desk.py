@@ -11,10 +11,12 @@ from gates.doubt import Doubt, sentence
 from gates.doubts import of_a_ladder
 from gates.more import INSIDE, hardly_decided
 from gates.pages.numbers import at_its_end, beyond, judged_at, rests_on
+from gates.protection import REHEARSED
 from gates.readable import between, human
-from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
+from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport, report_bytes
 from gates.verdicts import decided_by
 from gates.words import advice_of
+from genpolicy.integrity.hashing import sha256_bytes
 
 HEADLINES: dict[Gate, tuple[str, str]] = {
     "A": ("multimodal_situations", "held-out situations in which more than one way is taken"),
@@ -24,6 +26,14 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
     "E": ("owners_signed", "owners have signed"),
 }
 """The one number of each gate, and what it is a number of."""
+UNREADABLE = "UNREADABLE"
+NO_CARD = "no card of a rehearsal can be signed"
+REAL_LADDER = (
+    "Limits that protect people may be looser here; a card is of a ladder without "
+    "`rehearsal: true`."
+)
+JUDGE_AGAIN = "It says nothing of the one that lies here; judge again: `make ladder`."
+NOTHING_BROKEN: Mapping[Gate, str] = {}
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,8 @@ class Box:
     Attributes:
         gate: Its letter.
         name: Its name.
-        verdict: Of its report; `NOT JUDGED` where none lies there.
+        verdict: Of its report; `NOT JUDGED` where none lies there, `UNREADABLE` where one does
+            that says nothing.
         number: As a person reads it; empty where nothing was measured.
         of: What it is a number of.
         overridden: Whether somebody overrides a limit of it, or of a gate below.
@@ -128,12 +139,17 @@ class Desk:
     parts: tuple[Part, ...]
 
 
-def desk_of(reports: Mapping[Gate, GateReport], pending: str = "") -> Desk:
+def desk_of(
+    reports: Mapping[Gate, GateReport],
+    pending: str = "",
+    unreadable: Mapping[Gate, str] = NOTHING_BROKEN,
+) -> Desk:
     """The desk of the reports that lie there and can be read.
 
     Args:
         reports: By gate.
         pending: What of the card waits for people, as `desk_card.Signing.pending` says it.
+        unreadable: Why the report of a gate that lies there cannot be read, by gate.
     """
     present = [gate for gate in GATES if gate in reports]
     bars = [
@@ -145,11 +161,8 @@ def desk_of(reports: Mapping[Gate, GateReport], pending: str = "") -> Desk:
     judged = [answer for gate in present for answer in _shown(reports[gate])]
     doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
     return Desk(
-        asked=_asked(reports, pending),
-        boxes=tuple(
-            replace(_box(gate, reports.get(gate)), overridden=_overridden(reports.get(gate)))
-            for gate in GATES
-        ),
+        asked=_asked(reports, pending, unreadable),
+        boxes=tuple(_box_of(gate, reports, unreadable) for gate in GATES),
         doubts=tuple(doubts),
         not_shown=tuple(not_shown),
         bars=tuple(sorted(bars, key=lambda bar: first_what_does_not_hold(bar.near))),
@@ -166,8 +179,22 @@ def _shown(report: GateReport) -> list[Answer]:
     return [c for c in report.criteria if c.candidate is None or c.candidate in kept]
 
 
-def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
+def other_below(reports: Mapping[Gate, GateReport], gate: Gate) -> Gate | None:
+    """The first gate below whose report is another one than `gate` was judged over."""
+    for below in GATES[: GATES.index(gate)]:
+        if below in reports and gate in reports:
+            lies_here = sha256_bytes(report_bytes(reports[below]))
+            if reports[gate].upstream.get(below) != lies_here:
+                return below
+    return None
+
+
+def _asked(
+    reports: Mapping[Gate, GateReport], pending: str, unreadable: Mapping[Gate, str]
+) -> Asked:
     stopped = next((gate for gate in GATES if not _passes(reports.get(gate))), None)
+    if nothing := _in_vain(reports, unreadable, stopped):
+        return nothing
     promoted = reports["D"].promoted if "D" in reports else None
     report = reports.get(stopped) if stopped else None
     if stopped is None:
@@ -187,6 +214,27 @@ def _asked(reports: Mapping[Gate, GateReport], pending: str) -> Asked:
     advice = advice_of(report.diagnosis) if decided.verdict == "INCONCLUSIVE" else ""
     said = (found, _next(decided, report.decision), advice)
     return Asked(title, " ".join(part for part in said if part), "")
+
+
+def _in_vain(
+    reports: Mapping[Gate, GateReport], unreadable: Mapping[Gate, str], stopped: Gate | None
+) -> Asked | None:
+    """Why nobody can be asked, where no verdict says so: what lies there is broken, or practice."""
+    if stopped in unreadable:
+        what = f"the report of gate {stopped}, {NAMES[stopped]}, cannot be read"
+        return Asked(f"Nothing is asked of you: {what}", sentence(unreadable[stopped]), "")
+    for gate in GATES[: GATES.index(stopped or "E") + 1]:
+        if below := other_below(reports, gate):
+            what = f"gate {gate} was judged over another report of gate {below}"
+            return Asked(f"Nothing is asked of you: {what}", JUDGE_AGAIN, "")
+    if stopped in (None, "E") and reports["D"].promoted and _rehearsed(reports):
+        title = f"Nothing is asked of you: this is a rehearsal, and {NO_CARD}"
+        return Asked(title, f"{sentence(reports['D'].decision)} {REAL_LADDER}", "")
+    return None
+
+
+def _rehearsed(reports: Mapping[Gate, GateReport]) -> bool:
+    return any(REHEARSED in report.caveats for report in reports.values())
 
 
 def _passes(report: GateReport | None) -> bool:
@@ -214,11 +262,26 @@ def _next(decided: Answer, decision: str) -> str:
     return sentence(decided.caveat.rpartition("; ")[2].removeprefix(f"{INSIDE}: "))
 
 
-def _box(gate: Gate, report: GateReport | None) -> Box:
-    name, of = HEADLINES[gate]
+def _box_of(gate: Gate, reports: Mapping[Gate, GateReport], unreadable: Mapping[Gate, str]) -> Box:
+    report = reports.get(gate)
     if report is None:
-        return Box(gate, NAMES[gate], "NOT JUDGED", "", "")
-    said = [c for c in _shown(report) if c.id == name]
+        return Box(gate, NAMES[gate], UNREADABLE if gate in unreadable else "NOT JUDGED", "", "")
+    if gate == "E" and report.verdict == "PENDING_REVIEW" and _rehearsed(reports):
+        box = Box(gate, NAMES[gate], report.verdict, "", NO_CARD)
+    else:
+        box = _box(gate, report)
+    below = other_below(reports, gate)
+    of = f"{box.of}; judged over another report of gate {below}" if below else box.of
+    return replace(box, of=of, overridden=bool(report.overrides))
+
+
+def headline(report: GateReport) -> list[Answer]:
+    """The criteria whose numbers are the one number of a gate: of it, or of each candidate."""
+    return [c for c in _shown(report) if c.id == HEADLINES[report.gate][0]]
+
+
+def _box(gate: Gate, report: GateReport) -> Box:
+    of, said = HEADLINES[gate][1], headline(report)
     if gate == "E" and said and said[0].threshold is not None:
         signed, all_of = int(said[0].measured or 0), human(said[0], said[0].threshold)
         return Box(gate, NAMES[gate], report.verdict, f"{signed or 'none'} of {all_of}", of)
@@ -229,10 +292,6 @@ def _box(gate: Gate, report: GateReport | None) -> Box:
         return Box(gate, NAMES[gate], report.verdict, next(iter(texts.values())), of)
     each = ", ".join(f"{candidate} {text}" for candidate, text in texts.items())
     return Box(gate, NAMES[gate], report.verdict, each, of)
-
-
-def _overridden(report: GateReport | None) -> bool:
-    return report is not None and bool(report.overrides)
 
 
 def _part(owner: str, reports: Mapping[Gate, GateReport]) -> Part:

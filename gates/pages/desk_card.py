@@ -5,9 +5,9 @@ robot is stopped and for which days are left to the people who answer for them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard, missing_fields
+from gates.card.card import ABORT_FROM, DRAFT_PATH, FIXED, TrialCard, missing_fields, undrafted
 from gates.card.envelope import ENVELOPE_FILE
 from gates.card.papers import Papers, examine
 from gates.card.people import REVIEWER, SIGNERS
@@ -16,6 +16,8 @@ from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
 from gates.pages.numbers import at_its_end
+from gates.pages.rows import Rows
+from gates.protection import REHEARSED
 from gates.readable import human
 from gates.report import Answer, Gate, GateReport, Point
 from gates.stress.rollouts import ROLLOUTS, STRESS
@@ -29,6 +31,7 @@ NOTHING = "nothing that simulation can show"
 NOT_PROPOSED = "not proposed"
 ELSEWHERE = "not built here"
 MISSING = "missing on the signed card"
+UNSIGNED = "nothing: no card of a rehearsal can be signed"
 AS_SIMULATED = "as simulated; for another one plan it and run again"
 ABORTS = {
     "latency_s": "more than 5 % of answers later than",
@@ -40,6 +43,9 @@ ABORTS = {
     "reset_share": "runs that stop, to be reset, above",
 }
 """What each abort threshold of a card ends the trial at, in words."""
+WORKSPACE, SPEED, INSTEAD = "Workspace, mm", "Speed of the tool", "What runs instead"
+FORCE = "Ends it: contact force above"
+NO_ROWS: Mapping[Gate, Rows] = {}
 MM_PER_M = 1000.0
 
 
@@ -54,6 +60,7 @@ class Item:
         yours: What people set, of a signed card; what is left to them of a draft. Empty where a
             line is to be filled.
         owner: Who answers for it.
+        rows: File of the rows under what was seen, beside the first page; empty where none is.
     """
 
     field: str
@@ -61,6 +68,7 @@ class Item:
     proposed: str
     yours: str
     owner: str
+    rows: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,9 @@ class Signing:
         signed: Who has signed, `id (role)`.
         lacking: Roles that have not.
         fields: Fields that a person has still to fill; the nonce is drawn, and none of them.
+        undrafted: Empty fields that no person can fill: params.yaml has to give them, and the card
+            to be drafted again.
+        rehearsed: Why nothing of it can be signed; empty where it can.
         refusal: Why the card that lies there is refused; empty if none is.
         missing: Why nothing is shown; empty if something is.
     """
@@ -82,18 +93,24 @@ class Signing:
     signed: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
+    undrafted: tuple[str, ...] = ()
+    rehearsed: str = ""
     refusal: str = ""
     missing: str = ""
 
     @property
     def pending(self) -> str:
-        """What waits for people: `5 signatures, 7 fields`; empty where nothing does."""
+        """What waits for people: `5 signatures, 7 fields`; empty where nothing does, or can."""
+        if self.rehearsed:
+            return ""
         if self.missing:
             return "the card is not drawn"
         if self.refusal:
             return "the card that lies here is refused"
         open_ones = ((len(self.lacking), "signature"), (len(self.fields), "field"))
-        return ", ".join(f"{n} {what}{'s' if n > 1 else ''}" for n, what in open_ones if n)
+        counted = [f"{n} {what}{'s' if n > 1 else ''}" for n, what in open_ones if n]
+        given = [f"a draft with {' and '.join(self.undrafted)}"] if self.undrafted else []
+        return ", ".join([*given, *counted])
 
 
 def papers_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Papers | None:
@@ -116,7 +133,10 @@ def card_of(papers: Papers | None) -> TrialCard | None:
 
 
 def signing_of(
-    reports: Mapping[Gate, GateReport], evidence: Evidence, papers: Papers | None
+    reports: Mapping[Gate, GateReport],
+    evidence: Evidence,
+    papers: Papers | None,
+    rows: Mapping[Gate, Rows] = NO_ROWS,
 ) -> Signing:
     """The fields of the card beside what was seen.
 
@@ -124,6 +144,7 @@ def signing_of(
         reports: By gate.
         evidence: Below the same root.
         papers: As `papers_of` gives them.
+        rows: Files of rows that are printed beside the pages, by gate.
     """
     draft = papers.draft if papers else None
     if papers is None or draft is None or "D" not in reports:
@@ -133,18 +154,42 @@ def signing_of(
         return Signing(missing="the card that lies here was drafted from other reports")
     people = papers.signed.signers if papers.signed else ()
     roles = {person.role for person in people}
+    items = _items(draft, papers.signed.card if papers.signed else None, reports, evidence)
+    whose = {FORCE: draft.candidate, INSTEAD: _policy(reports, evidence)}
+    items = tuple(replace(item, rows=_rows(item, whose, reports["D"], rows)) for item in items)
+    if any(REHEARSED in report.caveats for report in reports.values()):
+        unsigned = tuple(replace(item, yours=item.yours or UNSIGNED) for item in items)
+        return Signing(items=unsigned, caveats=len(draft.caveats), rehearsed=REHEARSED)
+    open_ones = missing_fields(papers.signed.card if papers.signed else draft)
     return Signing(
-        items=_items(draft, papers.signed.card if papers.signed else None, reports, evidence),
+        items=items,
         caveats=len(draft.caveats),
         signed=tuple(f"{person.id} ({person.role})" for person in people),
         lacking=tuple(role for role in SIGNERS if role not in roles),
-        fields=tuple(
-            name
-            for name in missing_fields(papers.signed.card if papers.signed else draft)
-            if name != "nonce"
-        ),
+        fields=tuple(name for name in open_ones if name != "nonce" and name not in FIXED),
+        undrafted=tuple(undrafted(draft)),
         refusal=papers.refusal,
     )
+
+
+def _rows(
+    item: Item, whose: Mapping[str, str], report: GateReport, rows: Mapping[Gate, Rows]
+) -> str:
+    """Where the rows under what was seen lie, beside the first page; empty where none do."""
+    if "D" not in rows or item.seen in (ELSEWHERE, NOTHING):
+        return ""
+    if item.field in (WORKSPACE, SPEED):
+        found = rows["D"].of(ENVELOPE_FILE)
+    elif item.field in (FORCE, INSTEAD):
+        of = rows["D"].by_method(ROLLOUTS)
+        found = [of[name] for name in (whose[item.field],) if name in of]
+    else:
+        names = {f"Ends it: {text}": ABORT_FROM[name] for name, text in ABORTS.items()}
+        own = [c for c in report.criteria if c.candidate == whose[FORCE]]
+        judged = [c for c in own if c.id == names.get(item.field)]
+        again = [file for c in judged if (file := rows["D"].recounted(c))]
+        found = again or [file for c in judged for file in rows["D"].under(c)]
+    return f"{rows['D'].folder}/{found[0].name}" if found else ""
 
 
 def _items(
@@ -159,16 +204,16 @@ def _items(
     fastest = reached.fastest_m_s if reached else None
     box = _box(draft.workspace_lower_m, draft.workspace_upper_m)
     return (
-        Item("Workspace, mm", went, box, AS_SIMULATED, "controller"),
+        Item(WORKSPACE, went, box, AS_SIMULATED, "controller"),
         Item(
-            "Speed of the tool",
+            SPEED,
             ELSEWHERE if fastest is None else f"at most {fastest:.3g} m/s",
             f"at most {draft.speed_limit_m_s:.3g} m/s",
             AS_SIMULATED,
             "controller",
         ),
         Item(
-            "Ends it: contact force above",
+            FORCE,
             _force(draft.candidate, report, evidence),
             NOT_PROPOSED,
             _signed_force(signed),
@@ -249,6 +294,14 @@ def _signed_threshold(signed: TrialCard | None, name: str, answer: Answer) -> st
     return MISSING if value is None else human(answer, value)
 
 
+def _policy(reports: Mapping[Gate, GateReport], evidence: Evidence) -> str:
+    """What a card would roll back to; empty where nobody can say."""
+    try:
+        return rollback_of(reports, evidence).policy
+    except (MissingEvidenceError, IntegrityError, KeyError):
+        return ""
+
+
 def _rollback(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Item:
     seen, proposed = ELSEWHERE, ELSEWHERE
     try:
@@ -260,4 +313,4 @@ def _rollback(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Item:
         proposed = f"stop, then {found.policy} (checkpoint {known}…), or by hand"
     except (MissingEvidenceError, IntegrityError, KeyError):
         pass
-    return Item("What runs instead", seen, proposed, "as proposed", "model")
+    return Item(INSTEAD, seen, proposed, "as proposed", "model")

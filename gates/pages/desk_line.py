@@ -10,9 +10,14 @@ from dataclasses import dataclass
 from gates.card.card import TrialCard
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.bound import require_bound
+from gates.pages.desk import other_below
 from gates.pipeline import TASK, TASK_IDENTITY
 from gates.report import Gate, GateReport
+from gates.settings import read_params
 from genpolicy.documents.task import IDENTITY
+from genpolicy.errors import GenpolicyError
+
+NOBODY = "nobody who is named"
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,8 @@ class Line:
         task: Its name.
         robot: Name of the robot model in the scene.
         candidate: The promoted method; empty where none is.
-        authors: Who made it, as its card names them; empty without a card.
+        authors: Who made it, as its card names them, or before one is drafted `params.yaml`; empty
+            where neither lies here.
         signed: Whether a signed card covers these very reports.
     """
 
@@ -47,9 +53,19 @@ def line_of(reports: Mapping[Gate, GateReport], evidence: Evidence, card: TrialC
         task=task,
         robot=robot,
         candidate=(reports["D"].promoted or "") if "D" in reports else "",
-        authors="" if card is None else ", ".join(card.authors) or "nobody who is named",
-        signed="E" in reports and reports["E"].verdict == "PASS",
+        authors=_authors(evidence) if card is None else ", ".join(card.authors) or NOBODY,
+        signed="E" in reports
+        and reports["E"].verdict == "PASS"
+        and other_below(reports, "E") is None,
     )
+
+
+def _authors(evidence: Evidence) -> str:
+    try:
+        named = (read_params(evidence.root).get("card") or {}).get("authors")
+    except GenpolicyError:
+        return ""
+    return ", ".join(map(str, named or ())) or NOBODY
 
 
 def _task(reports: Mapping[Gate, GateReport], evidence: Evidence) -> tuple[str, str]:

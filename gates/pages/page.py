@@ -46,7 +46,7 @@ from gates.pages import (
 )
 from gates.pages.card_shown import card_shown
 from gates.pages.clips import clips_of
-from gates.pages.desk import desk_of
+from gates.pages.desk import UNREADABLE, desk_of, headline
 from gates.pages.desk_card import card_of, papers_of, signing_of
 from gates.pages.desk_costs import HEADS, costs_of
 from gates.pages.desk_end import end_of
@@ -55,7 +55,7 @@ from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
-from gates.pages.numbers import judged_at, limit_said, recounted, rests_on
+from gates.pages.numbers import at_its_end, judged_at, limit_said, recounted, rests_on
 from gates.pages.rows import CRITERIA, Rows, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.readable import human
@@ -74,7 +74,7 @@ MARKS = {
     "INCONCLUSIVE": "?",
     "PENDING_REVIEW": "…",
     "NOT JUDGED": "·",
-    "UNREADABLE": "✕",
+    UNREADABLE: "✕",
 }
 PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
@@ -208,15 +208,17 @@ def index_page(root: Path) -> str:
     """HTML of the ladder, from the reports as they lie there."""
     rows = [_row(root, gate) for gate in GATES]
     reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
+    unreadable = {row["gate"]: row["decision"] for row in rows if row["verdict"] == UNREADABLE}
     evidence = Evidence(root)
     papers = papers_of(reports, evidence)
-    signing = signing_of(reports, evidence, papers)
     rows_by_gate = {gate: rows_of(root, report) for gate, report in reports.items()}
+    signing = signing_of(reports, evidence, papers, rows_by_gate)
     return _render(
         "index.html",
         current="",
         ladder=rows,
-        desk=desk_of(reports, signing.pending),
+        desk=desk_of(reports, signing.pending, unreadable),
+        headlines={gate: headline(report) for gate, report in reports.items()},
         overridden=list(dict.fromkeys(said(e) for r in reports.values() for e in r.overrides)),
         line=line_of(reports, evidence, card_of(papers)),
         gain=gain_of(reports, evidence),
@@ -251,7 +253,7 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
     try:
         report, _ = read_report(root, gate)
     except IntegrityError as error:
-        return {**row, "verdict": "UNREADABLE", "decision": str(error)}
+        return {**row, "verdict": UNREADABLE, "decision": str(error)}
     row.update(
         verdict=report.verdict,
         decided=deciding(report) or passed_by(report),
@@ -286,6 +288,7 @@ def _render(template: str, **values: Any) -> str:
         human=human,
         judged_at=judged_at,
         limit_said=limit_said,
+        at_its_end=at_its_end,
         rests_on=rests_on,
         recounted=recounted,
         plain=lambda value: json.dumps(value, ensure_ascii=False),

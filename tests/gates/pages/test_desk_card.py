@@ -1,5 +1,6 @@
 """What you sign: what was seen stands beside what is proposed, and nothing is proposed unseen."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from team import PEOPLE, Team
 from gates.card.signing import read_draft
 from gates.evidence import Evidence
 from gates.pages.desk_card import ABORTS, MISSING, NOT_PROPOSED, card_of, papers_of, signing_of
+from gates.writing import write_gate
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +76,25 @@ def test_the_rollback_says_its_own_success(whole, waits):
     back = by_field(of(whole, waits)[0])["What runs instead"]
     assert back.seen == "succeeds in 50 %, 280 of 560 rollouts"
     assert back.proposed.startswith("stop, then bc (checkpoint ")
+
+
+def test_what_was_seen_leads_to_its_rows(copied):
+    """On the first page; each file that is named lies there."""
+    write_gate(copied, "D")
+    write_gate(copied, "E")
+    page = (copied / "reports/index.html").read_text()
+    part = page[page.index("6 · What you sign") : page.index("7 · Your part")]
+    leads = dict(re.findall(r'<tr><th scope="row">(.*?)</th><td><a href="(.*?)">', part))
+    promoted, back = read_draft(copied).candidate, "bc"
+    assert leads["Ends it: contact force above"].endswith(f"{promoted}.csv")
+    assert leads["What runs instead"].endswith(f"{back}.csv")
+    assert {f"Ends it: {text}" for text in ABORTS.values()} <= set(leads)
+    boxes = page[page.index('<div class="boxes">') : page.index("1 · What could make this wrong")]
+    leads["boxes"], *others = re.findall(r'<b><a href="([^"]*/[^"]*)"', boxes)
+    assert len(others) >= 2
+    for href in [*leads.values(), *others]:
+        assert (copied / "reports" / href).is_file(), href
+    assert "Stop path" not in leads and "Days of validity" not in leads
 
 
 def test_without_contact_nothing_is_known_of_force(copied, waits):

@@ -2,6 +2,7 @@
 
 import evidence
 import pytest
+import yaml
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.bound import require_bound
@@ -26,7 +27,17 @@ def test_task_robot_and_who_is_promoted(whole, judged, line):
     found = line(whole, "ABCD")
     assert (found.task, found.robot) == ("tabletop_insertion", "panda")
     assert found.candidate == judged("D").promoted
-    assert (line(whole, "ABC").candidate, found.authors, found.signed) == ("", "", False)
+    assert (line(whole, "ABC").candidate, found.signed) == ("", False)
+
+
+def test_who_made_it_is_said_before_a_card_is_drafted(copied, line):
+    """By the settings that a card will be drafted from; and that nobody is named, where so."""
+    assert line(copied, "ABC").authors == "ada"
+    params = copied / "params.yaml"
+    params.write_text(yaml.safe_dump({**yaml.safe_load(params.read_text()), "card": {}}))
+    assert line(copied, "A").authors == "nobody who is named"
+    params.unlink()
+    assert line(copied, "A").authors == ""
 
 
 def test_of_another_task_than_the_reports_name_nothing_is_said(copied, line):
