@@ -121,7 +121,8 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     dossier = Dossier(settings, papers, error, day, until)
     limits = read_limits(params, "E", GATE.criteria)
     evidence = recorded_evidence(root, "E")
-    spec = replace(GATE, decide=lambda _: NOBODY_SIGNS) if REHEARSED in caveats else GATE
+    practice = any(caveat.startswith(REHEARSED) for caveat in caveats)
+    spec = replace(GATE, decide=lambda _: NOBODY_SIGNS) if practice else GATE
     report = judge(
         spec, evidence, limits, settings, given=dossier, caveats=caveats, exceptions=exceptions
     )

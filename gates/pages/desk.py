@@ -227,14 +227,16 @@ def _in_vain(
         if below := other_below(reports, gate):
             what = f"gate {gate} was judged over another report of gate {below}"
             return Asked(f"Nothing is asked of you: {what}", JUDGE_AGAIN, "")
-    if stopped in (None, "E") and reports["D"].promoted and _rehearsed(reports):
+    if stopped in (None, "E") and reports["D"].promoted and rehearsed(reports):
         title = f"Nothing is asked of you: this is a rehearsal, and {NO_CARD}"
         return Asked(title, f"{sentence(reports['D'].decision)} {REAL_LADDER}", "")
     return None
 
 
-def _rehearsed(reports: Mapping[Gate, GateReport]) -> bool:
-    return any(REHEARSED in report.caveats for report in reports.values())
+def rehearsed(reports: Mapping[Gate, GateReport]) -> bool:
+    """Whether these are reports of a rehearsal, of which no card can be signed."""
+    said = (caveat for report in reports.values() for caveat in report.caveats)
+    return any(caveat.startswith(REHEARSED) for caveat in said)
 
 
 def _passes(report: GateReport | None) -> bool:
@@ -266,7 +268,7 @@ def _box_of(gate: Gate, reports: Mapping[Gate, GateReport], unreadable: Mapping[
     report = reports.get(gate)
     if report is None:
         return Box(gate, NAMES[gate], UNREADABLE if gate in unreadable else "NOT JUDGED", "", "")
-    if gate == "E" and report.verdict == "PENDING_REVIEW" and _rehearsed(reports):
+    if gate == "E" and report.verdict == "PENDING_REVIEW" and rehearsed(reports):
         box = Box(gate, NAMES[gate], report.verdict, "", NO_CARD)
     else:
         box = _box(gate, report)

@@ -15,6 +15,7 @@ from gates.card.rollback import rollback_of
 from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
+from gates.pages.desk import rehearsed
 from gates.pages.numbers import at_its_end
 from gates.pages.rows import Rows
 from gates.protection import REHEARSED
@@ -157,7 +158,7 @@ def signing_of(
     items = _items(draft, papers.signed.card if papers.signed else None, reports, evidence)
     whose = {FORCE: draft.candidate, INSTEAD: _policy(reports, evidence)}
     items = tuple(replace(item, rows=_rows(item, whose, reports["D"], rows)) for item in items)
-    if any(REHEARSED in report.caveats for report in reports.values()):
+    if rehearsed(reports):
         unsigned = tuple(replace(item, yours=item.yours or UNSIGNED) for item in items)
         return Signing(items=unsigned, caveats=len(draft.caveats), rehearsed=REHEARSED)
     open_ones = missing_fields(papers.signed.card if papers.signed else draft)
