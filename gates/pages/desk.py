@@ -228,7 +228,7 @@ def _in_vain(
             what = f"gate {gate} was judged over another report of gate {below}"
             return Asked(f"Nothing is asked of you: {what}", JUDGE_AGAIN, "")
     if stopped in (None, "E") and reports["D"].promoted and rehearsed(reports):
-        title = f"Nothing is asked of you: this is a rehearsal, and {NO_CARD}"
+        title = f"Nothing is asked of you: {NO_CARD}"
         return Asked(title, f"{sentence(reports['D'].decision)} {REAL_LADDER}", "")
     return None
 

@@ -160,7 +160,9 @@ def test_a_rehearsal_is_never_signed_and_never_valid(team):
     assert "rehearsal" in red["signature_valid"]
     assert any("rehearsal" in caveat for caveat in report.caveats)
     path.unlink()
-    assert team.judge().verdict == "PENDING_REVIEW"
+    waits = team.judge()
+    assert waits.verdict == "PENDING_REVIEW"
+    assert waits.decision == "Wait for nobody: no card of a rehearsal can be signed."
     with pytest.raises(BadInputError, match="rehearsal") as refused:
         team.sign(team.complete(), ["rita"])
     assert "without `rehearsal: true`" in refused.value.action

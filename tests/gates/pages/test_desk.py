@@ -1,6 +1,5 @@
 """The desk: what is asked in each state of the ladder, numbers as people read them."""
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -9,21 +8,17 @@ import evidence
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
-from team import PEOPLE, Team
+from team import Team
 
-from gates.card.card import card_bytes
-from gates.card.drafting import draft
 from gates.closeness import closeness
 from gates.evidence import Evidence
 from gates.more import HARDLY
 from gates.pages import page
-from gates.pages.desk import HEADLINES, desk_of, other_below, remark
+from gates.pages.desk import HEADLINES, desk_of, remark
 from gates.pages.desk_card import papers_of, signing_of
-from gates.pages.desk_line import line_of
 from gates.proof import judge
-from gates.report import GATES, NAMES, read_report
+from gates.report import GATES, read_report
 from gates.writing import write_gate, write_index
-from genpolicy.integrity.documents import canonical_json
 
 
 def desk(ladder):
@@ -83,102 +78,6 @@ def test_of_a_card_that_is_refused_the_desk_says_so(ladder):
     found = desk(ladder)
     assert found.asked.pending == "the card that lies here is refused"
     assert (found.boxes[-1].verdict, found.boxes[-1].number) == ("FAIL", "none of 4")
-
-
-def test_a_rehearsal_asks_for_no_signature_and_says_why(ladder):
-    """Its limits may be looser, and each signature would be refused."""
-    params = ladder / "params.yaml"
-    params.write_text("rehearsal: true\n" + params.read_text())
-    for gate in "ABCD":
-        write_gate(ladder, gate)
-    redrafted(ladder)
-    report = write_gate(ladder, "E")
-    assert report.verdict == "PENDING_REVIEW"
-    assert report.decision == "Wait for nobody: no card of a rehearsal can be signed."
-    found = desk(ladder)
-    assert found.asked.title == (
-        "Nothing is asked of you: this is a rehearsal, and no card of a rehearsal can be signed"
-    )
-    assert "without `rehearsal: true`" in found.asked.text and found.asked.pending == ""
-    assert (found.boxes[-1].number, found.boxes[-1].of) == (
-        "", "no card of a rehearsal can be signed",
-    )  # fmt: skip
-    page = (ladder / "reports/index.html").read_text()
-    for asks in ("Asked of you", "Still to sign", "Still to fill", "genpolicy card", "to fill<"):
-        assert asks not in page
-    assert "<b>Nothing of this can be signed.</b> A rehearsal: limits that protect" in page
-    assert "to fill<" not in (ladder / "reports/gate_e.html").read_text()
-
-
-def test_a_chain_that_is_judged_again_below_asks_nothing_and_says_nothing_signed(ladder):
-    """The verdicts above are of another report than lies there, whatever they say."""
-    team = Team(ladder)
-    team.sign(team.complete(), PEOPLE)
-    evidence.record(ladder)
-    write_gate(ladder, "E")
-    reports = {gate: read_report(ladder, gate)[0] for gate in GATES}
-    reports["E"] = reports["E"].model_copy(update={"verdict": "PASS"})
-    promoted, at = reports["D"].promoted, Evidence(ladder)
-    assert desk_of(reports).asked.title.startswith(f"Signed: {promoted} may move a robot")
-    assert line_of(reports, at, None).signed and other_below(reports, "E") is None
-    reports["A"] = reports["A"].model_copy(update={"caveats": ("Judged again.",)})
-    found = desk_of(reports)
-    assert found.asked.title == (
-        "Nothing is asked of you: gate B was judged over another report of gate A"
-    )
-    assert "make ladder" in found.asked.text and not found.asked.pending
-    assert [box.of.endswith("over another report of gate A") for box in found.boxes] == [
-        False, True, True, True, True,
-    ]  # fmt: skip
-    assert not line_of(reports, at, None).signed
-    below = {gate: reports[gate] for gate in "BCDE"}
-    asked = desk_of({**below, "A": reports["A"].model_copy(update={"verdict": "FAIL"})}).asked
-    assert asked.title.startswith("Nothing is asked of you yet: the ladder stops at gate A")
-
-
-@pytest.mark.parametrize("gate", ["A", "D"])
-def test_a_damaged_report_is_told_apart_from_one_that_is_missing(ladder, gate):
-    path = ladder / f"reports/gate_{gate.lower()}.json"
-    path.write_text(path.read_text()[:-40])
-    write_index(ladder)
-    text = (ladder / "reports/index.html").read_text()
-    name = NAMES[gate]
-    assert f"Nothing is asked of you: the report of gate {gate}, {name}, cannot be read" in text
-    asked = text[text.index('<div class="asked">') :].partition("</div>")[0]
-    assert "not judged" not in asked and f"dvc repro -f gate_{gate.lower()}" in asked
-    box = text[text.index(f'id="gate-{gate.lower()}"') :].partition("</div>")[0]
-    assert "✕ UNREADABLE" in box and "href" not in box
-    path.unlink()
-    write_index(ladder)
-    text = (ladder / "reports/index.html").read_text()
-    assert "It was not judged: `make ladder`." in text and "UNREADABLE" not in text
-
-
-def test_a_draft_without_authors_is_nobodys_to_fill(ladder):
-    """As `params.yaml` ships: what the draft fixes is named apart, with what to do."""
-    redraft(ladder, authors=[])
-    evidence.record(ladder)
-    write_gate(ladder, "E")
-    assert desk(ladder).asked.pending == "a draft with authors, 5 signatures, 7 fields"
-    page = (ladder / "reports/index.html").read_text()
-    assert "Nobody can fill authors:" in page and "card.authors" in page
-    assert "genpolicy card fill" not in page
-    fields = page[page.index("Still to fill: ") :].partition("</p>")[0]
-    assert "authors" not in fields and "spotter" in fields
-
-
-def redrafted(root):
-    """The draft of the reports that lie there now."""
-    found = {gate: read_report(root, gate) for gate in "ABCD"}
-    reports = {gate: report for gate, (report, _) in found.items()}
-    card = draft(root, reports, {gate: digest for gate, (_, digest) in found.items()})
-    (root / "artifacts/card/card.json").write_bytes(card_bytes(card))
-    evidence.record(root)
-
-
-def redraft(root, **changes):
-    path = root / "artifacts/card/card.json"
-    path.write_bytes(canonical_json({**json.loads(path.read_bytes()), **changes}))
 
 
 def test_a_stopped_ladder_says_where_by_what_and_never_asks(ladder):
