@@ -220,7 +220,7 @@ def _in_vain(
     reports: Mapping[Gate, GateReport], unreadable: Mapping[Gate, str], stopped: Gate | None
 ) -> Asked | None:
     """Why nobody can be asked, where no verdict says so: what lies there is broken, or practice."""
-    if stopped in unreadable:
+    if stopped is not None and stopped in unreadable:
         what = f"the report of gate {stopped}, {NAMES[stopped]}, cannot be read"
         return Asked(f"Nothing is asked of you: {what}", sentence(unreadable[stopped]), "")
     for gate in GATES[: GATES.index(stopped or "E") + 1]:
