@@ -46,7 +46,6 @@ ABORTS = {
 """What each abort threshold of a card ends the trial at, in words."""
 WORKSPACE, SPEED, INSTEAD = "Workspace, mm", "Speed of the tool", "What runs instead"
 FORCE = "Ends it: contact force above"
-NO_ROWS: Mapping[Gate, Rows] = {}
 MM_PER_M = 1000.0
 
 
@@ -137,7 +136,7 @@ def signing_of(
     reports: Mapping[Gate, GateReport],
     evidence: Evidence,
     papers: Papers | None,
-    rows: Mapping[Gate, Rows] = NO_ROWS,
+    beside: Rows | None = None,
 ) -> Signing:
     """The fields of the card beside what was seen.
 
@@ -145,7 +144,7 @@ def signing_of(
         reports: By gate.
         evidence: Below the same root.
         papers: As `papers_of` gives them.
-        rows: Files of rows that are printed beside the pages, by gate.
+        beside: Files of rows that are printed beside the page of gate D; None where none are.
     """
     draft = papers.draft if papers else None
     if papers is None or draft is None or "D" not in reports:
@@ -157,7 +156,7 @@ def signing_of(
     roles = {person.role for person in people}
     items = _items(draft, papers.signed.card if papers.signed else None, reports, evidence)
     whose = {FORCE: draft.candidate, INSTEAD: _policy(reports, evidence)}
-    items = tuple(replace(item, rows=_rows(item, whose, reports["D"], rows)) for item in items)
+    items = tuple(replace(item, rows=_rows(item, whose, reports["D"], beside)) for item in items)
     if rehearsed(reports):
         unsigned = tuple(replace(item, yours=item.yours or UNSIGNED) for item in items)
         return Signing(items=unsigned, caveats=len(draft.caveats), rehearsed=REHEARSED)
@@ -173,24 +172,22 @@ def signing_of(
     )
 
 
-def _rows(
-    item: Item, whose: Mapping[str, str], report: GateReport, rows: Mapping[Gate, Rows]
-) -> str:
+def _rows(item: Item, whose: Mapping[str, str], report: GateReport, beside: Rows | None) -> str:
     """Where the rows under what was seen lie, beside the first page; empty where none do."""
-    if "D" not in rows or item.seen in (ELSEWHERE, NOTHING):
+    if beside is None or item.seen in (ELSEWHERE, NOTHING):
         return ""
     if item.field in (WORKSPACE, SPEED):
-        found = rows["D"].of(ENVELOPE_FILE)
+        found = beside.of(ENVELOPE_FILE)
     elif item.field in (FORCE, INSTEAD):
-        of = rows["D"].by_method(ROLLOUTS)
+        of = beside.by_method(ROLLOUTS)
         found = [of[name] for name in (whose[item.field],) if name in of]
     else:
         names = {f"Ends it: {text}": ABORT_FROM[name] for name, text in ABORTS.items()}
         own = [c for c in report.criteria if c.candidate == whose[FORCE]]
         judged = [c for c in own if c.id == names.get(item.field)]
-        again = [file for c in judged if (file := rows["D"].recounted(c))]
-        found = again or [file for c in judged for file in rows["D"].under(c)]
-    return f"{rows['D'].folder}/{found[0].name}" if found else ""
+        again = [file for c in judged if (file := beside.recounted(c))]
+        found = again or [file for c in judged for file in beside.under(c)]
+    return f"{beside.folder}/{found[0].name}" if found else ""
 
 
 def _items(

@@ -212,7 +212,7 @@ def index_page(root: Path) -> str:
     evidence = Evidence(root)
     papers = papers_of(reports, evidence)
     rows_by_gate = {gate: rows_of(root, report) for gate, report in reports.items()}
-    signing = signing_of(reports, evidence, papers, rows_by_gate)
+    signing = signing_of(reports, evidence, papers, rows_by_gate.get("D"))
     return _render(
         "index.html",
         current="",
