@@ -111,7 +111,7 @@ def _spread(evidence: Evidence, report: GateReport) -> Table:
 
 def _components(evidence: Evidence, report: GateReport) -> Table:
     heads = ("method", "training seed", "start", "condition", "noise and the rest")
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for name, found, missing, _ in _over_trainings(evidence, report):
         if found is None:
             lines.append((name, missing, "", "", ""))

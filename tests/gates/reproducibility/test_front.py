@@ -67,7 +67,7 @@ def test_a_setting_that_diverges_is_never_advised_and_never_on_the_front():
 
 
 def test_a_cheaper_setting_that_misses_the_deadline_is_said_to():
-    """A median of 2 ms and answers of 300: wrong before, as what saves a millisecond and is better."""
+    """A median of 2 ms and answers of 300: once said to save a millisecond and to be better."""
     cheap = setting("cheap", 0.002, 0.99, answer_s=0.300)
     kept = setting("kept", 0.003, 0.90, answer_s=0.060)
     found = choice([cheap, kept], deadline_s=0.15)
