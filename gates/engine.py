@@ -16,7 +16,7 @@ from gates.more import astride, no_decision
 from gates.overrides import NOBODY, Exceptions, aside, exceptions_of, rule, said
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
 from gates.preregistration import moved_caveats
-from gates.protection import require_protection
+from gates.protection import is_rehearsal, require_protection
 from gates.report import (
     GATES,
     SCHEMA_VERSION,
@@ -124,6 +124,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
         candidates=names,
         caveats=(*caveats, *found),
         exceptions=exceptions_of(root, params, spec.gate),
+        rehearsed=is_rehearsal(params),
     )
     check_record(root, spec.gate, report.materials)
     require_running_code(root)
@@ -152,6 +153,7 @@ def judge(
     candidates: Sequence[str] = (),
     caveats: Sequence[str] = (),
     exceptions: Exceptions = NOBODY,
+    rehearsed: bool = False,
 ) -> GateReport:
     """Report of one gate.
 
@@ -165,6 +167,7 @@ def judge(
         candidates: Methods that stand for promotion.
         caveats: Caveats of this run, beside those of the gate.
         exceptions: Limits that somebody overrides, here and below.
+        rehearsed: Whether what is not applicable is not asked, whatever the evidence shows.
 
     Raises:
         BadInputError: Evidence that is not what it claims, or an exception that does not fit.
@@ -176,7 +179,7 @@ def judge(
         for name in (one for one in names if not settings.excepted(item.id, one)):
             if item.id not in limits.waived:
                 answers.append(_answer(item, evidence, inputs, limits.of.get(item.id), name))
-            elif shown := _applies(item, evidence, inputs, name):
+            elif not rehearsed and (shown := _applies(item, evidence, inputs, name)):
                 told = {"reason": f"declared not applicable, but {shown}"}
                 answer = _answer(item, evidence, inputs, None, name)
                 answers.append(answer.model_copy(update=told))

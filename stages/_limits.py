@@ -29,11 +29,20 @@ def require_pinned_limits(params: Params, root: Path) -> None:
         root: Workspace with `limits.yaml` and `fixtures.yaml`.
 
     Raises:
-        IntegrityError: No such file.
-        ConfigError: It is not as pinned, or a setting of `params.yaml` is another one than there.
+        ConfigError: `limits.yaml` is missing or not as pinned, or a setting of `params.yaml` is
+            another one than there.
+        IntegrityError: It is no regular file.
     """
     if params.raw.get(REHEARSAL) is True:  # what is neither true nor false stage `task` refuses
         return
+    if not (root / LIMITS).exists():
+        raise ConfigError(
+            where=LIMITS,
+            found="missing",
+            expected=f"the limits that {PARAMS} states, as a person reviewed and pinned them",
+            action="Restore it, or write task, horizons, execution and feasibility into it and pin "
+            "it with `genpolicy fixtures --pin`.",
+        )
     pinned = read_limits(root)
     if pinned.task != params.task.name:
         return

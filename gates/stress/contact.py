@@ -13,6 +13,7 @@ from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.stress.rollouts import StressSettings, rollouts
 
+FORCE = "force_peak_p95_n"
 UNTOUCHED = re.compile(r"(\S+): (no contact in [\d,]+ of [\d,]+ rollouts)\b")
 """How the caveat of a candidate that touched nothing begins: its name, and what was seen."""
 
@@ -32,13 +33,20 @@ def touched(evidence: Evidence, settings: StressSettings, candidate: str) -> str
 
 
 def contact_said(judged: Judged) -> list[str]:
-    """A caveat for each candidate that touched nothing in any planned condition."""
+    """A caveat for each candidate that touched nothing in any planned condition.
+
+    And for each that touched something of which a rehearsal asks nothing.
+    """
+    asked = {answer.candidate for answer in judged.answers if answer.id == FORCE}
     said = []
     for name in judged.candidates:
         try:
             forces = numbers(rollouts(judged.evidence, judged.settings, name), "force_peak_n")
         except MissingEvidenceError:
             continue  # the criteria say what is missing
+        if np.any(forces > 0) and name not in asked:
+            seen = touched(judged.evidence, judged.settings, name)
+            said.append(f"{name}: {seen.removeprefix('it ')}, and no limit of force was asked.")
         if np.all(forces == 0):
             count = f"{len(forces):,} of {len(forces):,}"
             said.append(

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from genpolicy.cli.fixtures import run_fixtures
-from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.errors import ConfigError
 from genpolicy.wall_clock.limits import LIMITS
 from stages import shadow, stress
 from stages._limits import require_pinned_limits
@@ -71,7 +71,7 @@ def test_what_only_one_clock_has_is_not_compared(pinned, edit):
 
 
 def test_without_pinned_limits_nobody_knows_them(workspace):
-    with pytest.raises(IntegrityError, match=LIMITS):
+    with pytest.raises(ConfigError, match=rf"{LIMITS} is missing, .*fixtures --pin"):
         held(workspace)
 
 

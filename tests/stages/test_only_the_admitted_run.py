@@ -34,7 +34,9 @@ def weightless(monkeypatch):
     """Checkpoints without weights; what is loaded says its method."""
 
     def load(folder, *, device, **_):
-        return SimpleNamespace(method=folder.parent.name, device=device)
+        name = folder.parent.name
+        checkpoint = SimpleNamespace(config=SimpleNamespace(method=name))
+        return SimpleNamespace(method=name, checkpoint=checkpoint, device=device)
 
     monkeypatch.setattr(judged, "load_policy", load)
     monkeypatch.setattr(
@@ -122,7 +124,10 @@ def test_stress_rolls_out_every_trained_seed_by_the_same_plan(
     verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
     params.raw["policy"]["seeds"] = [4, 0, 7]
     planned, written = [], []
-    without(monkeypatch, stress, "require_one_contract", "load_task", "Comparison")
+    without(
+        monkeypatch, stress, "require_one_contract", "require_pinned_limits", "load_task",
+        "Comparison",
+    )  # fmt: skip
     models = object()
     monkeypatch.setattr(stress, "latency_models", lambda *_: models)
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())

@@ -50,6 +50,19 @@ def test_force_is_asked_of_who_touched_although_it_was_declared_not_to_matter(la
     assert judge(ladder, "D").candidates == {"diffusion": "INCONCLUSIVE", "flow": "PASS"}
 
 
+def test_a_rehearsal_asks_nothing_of_it_and_says_so(ladder):
+    def told():
+        return [text for text in judge(ladder, "D").caveats if "no limit of force" in text]
+
+    assert told() == []
+    evidence.write_params(ladder, lambda p: _waive_force(p) or p.update(rehearsal=True))
+    assert [text.partition(":")[0] for text in told()] == ["diffusion", "flow"]
+    assert judge(ladder, "D").verdict == "PASS"
+    evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", 0.0, where=_of("flow")))
+    (text,) = told()
+    assert text.startswith("diffusion: touched something in ") and " N, and no limit" in text
+
+
 def test_one_touch_is_a_touch_and_what_is_missing_is_the_matter_of_the_criteria(ladder):
     def once(frame):
         first = _of("flow")(frame) & (frame["start"] == 0) & (frame["perturbation"] == "nominal")
