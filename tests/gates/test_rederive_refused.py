@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from gates.rederive_refused import REFUSED, rederive_refused
+from gates.rederive_refused import rederive_refused
+from gates.stress.rollouts import REFUSED
 from genpolicy.errors import IntegrityError, RefusedError
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
