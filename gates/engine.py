@@ -4,8 +4,8 @@ Pure: the report is a function of the evidence, the limits and the settings.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +111,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
     found = (*require_protection(params, spec.gate), *moved_caveats(root, params, spec.gate))
     limits = read_limits(params, spec.gate, spec.criteria)
+    limits = replace(limits, rehearsed=is_rehearsal(params))
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
@@ -124,7 +125,6 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
         candidates=names,
         caveats=(*caveats, *found),
         exceptions=exceptions_of(root, params, spec.gate),
-        rehearsed=is_rehearsal(params),
     )
     check_record(root, spec.gate, report.materials)
     require_running_code(root)
@@ -153,36 +153,28 @@ def judge(
     candidates: Sequence[str] = (),
     caveats: Sequence[str] = (),
     exceptions: Exceptions = NOBODY,
-    rehearsed: bool = False,
 ) -> GateReport:
     """Report of one gate.
 
     Args:
         spec: The gate.
         evidence: What it may read.
-        limits: By criterion; one without is INCONCLUSIVE, one not applicable a caveat, and asked
-            only where the evidence shows that it does apply.
+        limits: By criterion; one without is INCONCLUSIVE, one not applicable a caveat.
         settings: Recorded in the report.
         given: What the measures take in place of the settings, where a gate knows more.
         candidates: Methods that stand for promotion.
         caveats: Caveats of this run, beside those of the gate.
         exceptions: Limits that somebody overrides, here and below.
-        rehearsed: Whether what is not applicable is not asked, whatever the evidence shows.
 
     Raises:
         BadInputError: Evidence that is not what it claims, or an exception that does not fit.
     """
     inputs = settings.under(limits) if given is None else given
-    answers = []
+    answers: list[Answer] = []
     for item in spec.criteria:
         names = candidates if item.per_candidate else (None,)
-        for name in (one for one in names if not settings.excepted(item.id, one)):
-            if item.id not in limits.waived:
-                answers.append(_answer(item, evidence, inputs, limits.of.get(item.id), name))
-            elif not rehearsed and (shown := _applies(item, evidence, inputs, name)):
-                told = {"reason": f"declared not applicable, but {shown}"}
-                answer = _answer(item, evidence, inputs, None, name)
-                answers.append(answer.model_copy(update=told))
+        asked = [name for name in names if not settings.excepted(item.id, name)]
+        answers += _answers(item, evidence, inputs, limits, asked)
     evidence.bind(*spec.bind)
     lacking, about = _lacking(evidence), spec.below is not None
     ruled = rule(exceptions, spec.criteria, answers, limits, candidates=about, lacking=lacking)
@@ -253,6 +245,22 @@ def _answer(
         counted=measured.counted,
         recount=measured.recount,
     )
+
+
+def _answers(
+    item: Criterion,
+    evidence: Evidence,
+    inputs: object,
+    limits: Limits,
+    candidates: Sequence[str | None],
+) -> Iterator[Answer]:
+    """Of each who is asked; of what does not apply only where the evidence shows that it does."""
+    for name in candidates:
+        if item.id not in limits.waived:
+            yield _answer(item, evidence, inputs, limits.of.get(item.id), name)
+        elif not limits.rehearsed and (shown := _applies(item, evidence, inputs, name)):
+            told = {"reason": f"declared not applicable, but {shown}"}
+            yield _answer(item, evidence, inputs, None, name).model_copy(update=told)
 
 
 def _applies(item: Criterion, evidence: Evidence, inputs: object, candidate: str | None) -> str:

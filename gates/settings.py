@@ -80,10 +80,14 @@ def waived_question(name: str, waiver: Waiver) -> str:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of a gate, by criterion, and the criteria that are declared not applicable."""
+    """The limits of a gate, by criterion, and the criteria that are declared not applicable.
+
+    A rehearsal (`rehearsed`) asks nothing of these, whatever its evidence shows.
+    """
 
     of: Mapping[str, Limit] = field(default_factory=dict)
     waived: Mapping[str, Waiver] = field(default_factory=dict)
+    rehearsed: bool = False
 
     def number(self, criterion: str, *, otherwise: float) -> float:
         """The limit of a criterion; another number where it has none, or none of its own."""

@@ -77,12 +77,9 @@ def work(params: Params) -> None:
         for place, compared in runs.items():
             place.mkdir(parents=True, exist_ok=True)
             shards = plan_shards(
-                comparison,
-                compared,
-                section.conditions,
-                latency=latency,
+                comparison, compared, section.conditions, latency=latency,
                 journals=place / "journals",
-            )
+            )  # fmt: skip
             write_stress(
                 place, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
             )
