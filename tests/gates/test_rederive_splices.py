@@ -3,6 +3,7 @@
 import pytest
 
 from gates.rederive_splices import TABLE, rederive_splices
+from gates.stress.rollouts import STRESS
 from genpolicy.errors import RefusedError
 from genpolicy.evidence.rows.stress import SpliceRow
 from genpolicy.integrity.rows import write_rows
@@ -19,8 +20,9 @@ def stand(tmp_path):
     """Ask of one derived row, with some columns of the stated one changed."""
 
     def ask(derived=(ROW,), *, seed=3, **changes):
-        (tmp_path / TABLE).parent.mkdir(parents=True, exist_ok=True)
-        write_rows(tmp_path / TABLE, SpliceRow, [SpliceRow(**{**ROW, **changes}, seed=seed)])
+        (tmp_path / STRESS).mkdir(parents=True, exist_ok=True)
+        row = SpliceRow(**{**ROW, **changes}, seed=seed)
+        write_rows(tmp_path / STRESS / TABLE, SpliceRow, [row])
         rederive_splices(tmp_path, PARAMS, derived)
 
     return ask
