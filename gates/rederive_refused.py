@@ -7,14 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from gates.stated import Row, compare_rows, training_seed
-from gates.stress.rollouts import STRESS
+from gates.stress.rollouts import REFUSED, STRESS
 from genpolicy.evidence.rows.stress import RefusedRow
 from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.stress.worth import kept_whole
 from genpolicy.integrity.rows import read_columns
 from genpolicy.verification.refused import KEYS, RefusedCandidates, Rollout
-
-TABLE = "refused.parquet"
 
 
 def rederive_refused(
@@ -41,7 +39,7 @@ def rederive_refused(
         IntegrityError: The table is no regular file, or has not the columns of its row.
         BadInputError: It cannot be read.
     """
-    path = f"{folder}/{TABLE}"
+    path = f"{folder}/{Path(REFUSED).name}"
     stated = [_hashed(row) for row in read_columns(root / path, RefusedRow).to_pylist()]
     derived = list(refused.rows(_kept(rollouts)))
     compare_rows("D", path, KEYS, stated, derived, seed=training_seed(params))

@@ -15,6 +15,7 @@ from genpolicy.wall_clock.limits import LIMITS, read_limits
 from stages._stage import PARAMS, Params
 
 REHEARSAL = "rehearsal"
+"""Read here and not by `gates.protection`: a floor that moves would run shadow and stress again."""
 ONE_CLOCK = ("silence_stop_s", "term_deadlines")
 """Settings of `execution` that only one of the two clocks has."""
 

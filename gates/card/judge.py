@@ -43,7 +43,7 @@ from gates.overriders import first_end, require_in_force
 from gates.overrides import OVERRIDES, Exceptions, exceptions_of
 from gates.pipeline import check_record
 from gates.preregistration import PREREGISTRATION, moved_caveats
-from gates.protection import REHEARSED, require_protection
+from gates.protection import is_rehearsal, require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.reproducibility.settings import RELOAD
 from gates.running import require_running_code
@@ -121,8 +121,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     dossier = Dossier(settings, papers, error, day, until)
     limits = read_limits(params, "E", GATE.criteria)
     evidence = recorded_evidence(root, "E")
-    practice = any(caveat.startswith(REHEARSED) for caveat in caveats)
-    spec = replace(GATE, decide=lambda _: NOBODY_SIGNS) if practice else GATE
+    spec = replace(GATE, decide=lambda _: NOBODY_SIGNS) if is_rehearsal(params) else GATE
     report = judge(
         spec, evidence, limits, settings, given=dossier, caveats=caveats, exceptions=exceptions
     )

@@ -36,6 +36,7 @@ from genpolicy.evidence.reproducibility.conformance import (
 )
 from genpolicy.evidence.reproducibility.identity import Deployment, invocation_rate_hz, rule_sha256
 from genpolicy.evidence.reproducibility.sweep import drawn_by, quality_of, swept_windows
+from genpolicy.evidence.reproducibility.swept import told_apart
 from genpolicy.evidence.reproducibility.variations import wire_otherwise
 from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow
@@ -249,9 +250,9 @@ def _swept(policy: WirePolicy, candidate: BroughtPolicy, asked: Asked) -> list[C
 
 
 def _beside_steps(eta: float | None, nfe_cap: int | None) -> str:
-    """What an entry says of a sampler that has no column, as `sweep.beside_steps` says it."""
+    """What an entry says of a sampler that has no column; what it leaves out is not told."""
     said = {"eta": eta, "nfe_cap": nfe_cap}
-    return ", ".join(f"{name} {value:g}" for name, value in said.items() if value)
+    return told_apart({name: value for name, value in said.items() if value})
 
 
 def _sampler(entry: Entry) -> str:

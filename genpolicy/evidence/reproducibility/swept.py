@@ -45,6 +45,11 @@ def beside_steps(sampler: SamplerConfig) -> str:
         for name, item in SamplerConfig.model_fields.items()
         if name not in ("name", "steps", "tolerance") and getattr(sampler, name) != item.default
     }
+    return told_apart(own)
+
+
+def told_apart(settings: Mapping[str, float | None]) -> str:
+    """Settings beside name and steps, as a column and a page say them."""
     return ", ".join(
-        f"{name} {'none' if value is None else f'{value:g}'}" for name, value in own.items()
+        f"{name} {'none' if value is None else f'{value:g}'}" for name, value in settings.items()
     )
