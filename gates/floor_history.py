@@ -69,7 +69,7 @@ def _gates_of(scope: ast.stmt, tree: ast.Module) -> list[Gate]:
         return []
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     own = (c for c in calls if isinstance(c.func, ast.Name) and c.func.id == scope.name)
-    asked = {arg.value for call in own for arg in call.args[:1] if isinstance(arg, ast.Constant)}
+    asked = {arg.value for call in own for arg in call.args if isinstance(arg, ast.Constant)}
     return [gate for gate in GATES if gate in asked]
 
 

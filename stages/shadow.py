@@ -33,8 +33,8 @@ from stages._stage import ARTIFACTS, Params, main
 def work(params: Params) -> None:
     """Admit through gate B, then sample, check, corrupt and execute against the stub."""
     admitted = admit("shadow", Path.cwd()).candidates
-    require_pinned_limits(params, Path.cwd())
     require_one_contract("train_generators")
+    require_pinned_limits(params, Path.cwd())
     section = params.section("shadow", ShadowSection)
     feasibility = params.section("feasibility", FeasibilitySettings)
     seed = params.section("policy", PolicySettings).seeds[0]

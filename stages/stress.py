@@ -38,8 +38,8 @@ def work(params: Params) -> None:
     promotion is judged by.
     """
     admitted = admit("stress", Path.cwd()).candidates
-    require_pinned_limits(params, Path.cwd())
     require_one_contract("train_baselines", "train_generators", dataset=False)
+    require_pinned_limits(params, Path.cwd())
     section = params.section("stress", StressSettings)
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()

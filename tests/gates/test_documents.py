@@ -18,6 +18,7 @@ from gates.proof import judge
 from genpolicy.documents.document import Document
 from genpolicy.errors import BadInputError
 from genpolicy.evidence.documents.failures import FAILURE
+from genpolicy.evidence.documents.stress import TRAININGS, Trainings
 from genpolicy.integrity.documents import canonical_json
 
 
@@ -54,6 +55,8 @@ def root(tmp_path_factory, _ladder):
     (copied / "artifacts/reload/conformance.json").write_bytes(canonical_json({"flow": found}))
     failed = {"asked": 64, "faults": {"late": 1}, "last_words": "no answer within 2 s"}
     (copied / "artifacts/reload/faults.json").write_bytes(canonical_json({"flow": failed}))
+    # One seed trained everybody there, and of further ones no list is written.
+    TRAININGS.write(copied / "artifacts/stress", Trainings(seeds=[1]))
     # Nobody searched on that ladder; a file of each failure is named by what it is about.
     failure = copied / "artifacts/failure_search" / FAILURE.file
     failure.parent.mkdir(parents=True)

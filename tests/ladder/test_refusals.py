@@ -203,7 +203,7 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     assert (outcome.code, outcome.stage) == (3, "candidates")  # the first behind the gate
     assert ran == ["gate_a"]
     assert re.search(
-        r"Gate A refuses: persistence_margin is [\d.]+, required >= 1,000,000,000; "
+        r"Gate A refuses: persistence_margin is [\d.]+ %, required >= 100,000,000,000 %; "
         r"see reports/gate_a\.json",
         outcome.sentence,
     ), outcome.sentence

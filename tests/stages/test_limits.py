@@ -83,13 +83,15 @@ def test_a_rehearsal_may_differ_and_another_task_has_limits_of_its_own(pinned, e
 
 
 @pytest.mark.parametrize("of", [shadow, stress], ids=lambda module: module.__name__)
-def test_both_stages_ask_before_anything_is_read(pinned, edit, monkeypatch, of):
+def test_both_stages_ask_before_the_task_and_a_row_are_read(pinned, edit, monkeypatch, of):
     edit(pinned, CHANGED["execution.watchdog_s"])
     monkeypatch.setattr(of, "admit", lambda *_: type("A", (), {"candidates": ()}))
 
     def never(*_, **__):
         raise AssertionError("read before the limits were held")
 
-    monkeypatch.setattr(of, "require_one_contract", never)
+    monkeypatch.setattr(of, "require_one_contract", lambda *_, **__: None)
+    for name in ("load_task", "load_dataset", "read_brought"):
+        monkeypatch.setattr(of, name, never)
     with pytest.raises(ConfigError, match=r"execution\.watchdog_s is 0\.2"):
         of.work(load_params())
