@@ -157,15 +157,13 @@ class Loop:
     def _serve(self) -> None:
         """Read what there is; the person first."""
         self._heed()
-        session, now_s = self.session, self._now()
+        session, now_s, judges = self.session, self._now(), self._admission
         for payload in self._answers.read():
             answer = read_answer(payload)
             if answer is None:
                 session.tally.dropped["malformed"] += 1
             else:
-                session.answer(
-                    answer, now_s, self._admission.submit, judging_s=self._admission.usual_s
-                )
-        judged = self._admission.result()
+                session.answer(answer, now_s, judges.submit, judging_s=judges.usual_s)
+        judged = judges.result()
         if judged is not None:
-            session.decide(*judged, self._now())
+            session.decide(*judged, self._now(), judges.submit, judging_s=judges.usual_s)

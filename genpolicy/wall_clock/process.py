@@ -147,6 +147,7 @@ def _conclude(
         "clock_doubts": journal.doubts, "dropped": dict(sorted(dropped.items())),
         "policy_gone": inboxes["answers"].closed, "journal_lost": journal.lost,
         "learned": sorted(set(LEARNED) & set(sys.modules)),
+        "judged_again": session.tally.again,
         "late_s": session.tally.late_s, "decided_s": session.tally.decided_s,
     }  # fmt: skip
     write_bytes(folder / OUTCOME, json.dumps(outcome, sort_keys=True, indent=1).encode())

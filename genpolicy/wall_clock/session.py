@@ -9,10 +9,9 @@ Where a task's arm cannot be followed, each invocation begins with a reset, whic
 
 import math
 import sys
-from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
@@ -31,50 +30,17 @@ from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.tasks.api import Task
 from genpolicy.wall_clock.admission import Job, Result
+from genpolicy.wall_clock.asked import Asked, Tally
 from genpolicy.wall_clock.following import arm_of
 from genpolicy.wall_clock.messages import Answer, Ask, Operator, Order
 from genpolicy.wall_clock.replay import Replay
 from genpolicy.wall_clock.request import WallClockRequest
 from genpolicy.wall_clock.streamed import StreamedJournal
 
+Submit = Callable[[Job], bool]
+"""Whether a job was taken by who judges."""
 ROUNDING = 1e-6
 """Of a period."""
-
-
-@dataclass
-class Asked:
-    """An invocation that has not been decided.
-
-    Attributes:
-        metadata: Of the chunk that is to come.
-        row: Row of the replay that it was asked at.
-        asked_s: When, s.
-        answered_s: When the answer came, s; None before.
-        admitted: The chunk, where it passed; it is delivered when its first row is the next.
-        first_row: Row of the replay that its first checked action is for.
-    """
-
-    metadata: ChunkMetadata
-    row: int
-    asked_s: float
-    answered_s: float | None = None
-    admitted: Admitted | None = None
-    first_row: int = 0
-
-
-@dataclass
-class Tally:
-    """What is counted beside the journal.
-
-    Attributes:
-        dropped: What was not used, by reason.
-        decided_s: From each answer to the decision on it, s.
-        late_s: How late each tick was, s.
-    """
-
-    dropped: Counter[str] = field(default_factory=Counter)
-    decided_s: list[float] = field(default_factory=list)
-    late_s: list[float] = field(default_factory=list)
 
 
 class SupervisedSession:
@@ -186,7 +152,7 @@ class SupervisedSession:
         self,
         answer: Answer,
         now_s: float,
-        submit: Callable[[Job], bool],
+        submit: Submit,
         *,
         judging_s: float = 0.0,
     ) -> None:
@@ -195,7 +161,7 @@ class SupervisedSession:
         Args:
             answer: What it says.
             now_s: Time, s.
-            submit: Whether a job was taken by who judges.
+            submit: Takes it to be judged.
             judging_s: How long a verdict usually takes, s.
         """
         asked = self._asked
@@ -205,23 +171,26 @@ class SupervisedSession:
         if answer.invocation != asked.metadata.chunk_id:
             self.tally.dropped["unsolicited"] += 1
             return
-        asked.answered_s = now_s
+        asked.answered_s, asked.actions = now_s, answer.actions
         asked.metadata = replace(
             asked.metadata, policy_checkpoint_hash=answer.checkpoint,
             sampler_config_hash=answer.sampler, method=answer.method,
         )  # fmt: skip
         self.executor.end_invocation(now_s, asked.metadata.chunk_id, "answered")
-        last_row = asked.row + self.cell.horizons.execution_horizon - 1
-        if self._next_row(now_s, 0.0) > last_row:
+        if self._next_row(now_s, 0.0) > self._last_row(asked):
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
+        self._look(asked, now_s, submit, judging_s=judging_s)
+
+    def _look(self, asked: Asked, now_s: float, submit: Submit, *, judging_s: float) -> None:
+        """Have an answer judged for the first row that its verdict can be in time for."""
         # One verdict that took too long must not keep all that follow from being judged.
-        asked.first_row = min(self._next_row(now_s, judging_s), last_row)
+        asked.first_row = min(self._next_row(now_s, judging_s), self._last_row(asked))
         # The scene is that of the question: it stands on record, whatever ticks by until delivery.
         row, seen_s = self._seen if self.arm.follows else (asked.row, asked.asked_s)
         taken = submit(
             Job(
-                proposal=propose([Candidate(asked.metadata, answer.actions)]),
+                proposal=propose([Candidate(asked.metadata, asked.actions)]),
                 history=self.arm.history(row, min(row + 1, 2), scene=asked.row),
                 commanded=self.arm.commanded(asked.row, asked.first_row),
                 session=self._in_force(),
@@ -234,11 +203,32 @@ class SupervisedSession:
         if not taken:
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="admission_busy")
 
-    def decide(self, job: Job, result: Result, now_s: float) -> None:
-        """What became of an answer: it is enqueued, or counted under one reason."""
+    def decide(
+        self,
+        job: Job,
+        result: Result,
+        now_s: float,
+        submit: Submit,
+        *,
+        judging_s: float = 0.0,
+    ) -> None:
+        """What became of an answer: it is enqueued, judged anew, or counted under one reason.
+
+        Args:
+            job: What was judged.
+            result: What was found.
+            now_s: Time, s.
+            submit: Takes it to be judged for a later row, where its own has gone by.
+            judging_s: How long a verdict usually takes, s.
+        """
         asked, metadata = self._asked, job.proposal.metadata
         if asked is None or asked.metadata.chunk_id != metadata.chunk_id:
             self.tally.dropped["late_verdict"] += 1  # it was given up, and is accounted for
+            return
+        missed = isinstance(result, Admitted) and asked.first_row <= self._row
+        if missed and self._next_row(now_s, 0.0) <= self._last_row(asked):
+            self.tally.again += 1
+            self._look(asked, now_s, submit, judging_s=judging_s)
             return
         if result is not None:
             verdict = result.verdict
@@ -306,6 +296,10 @@ class SupervisedSession:
         if not math.isfinite(waited):
             return True
         return round(waited) >= self.cell.execution.deadline_s / period_s - ROUNDING
+
+    def _last_row(self, asked: Asked) -> int:
+        """Of the rows that a chunk may be executed in."""
+        return asked.row + self.cell.horizons.execution_horizon - 1
 
     def _next_row(self, now_s: float, judging_s: float) -> int:
         """The first row for which a verdict is in time: a chunk cannot begin behind its first."""

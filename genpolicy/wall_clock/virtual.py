@@ -61,7 +61,7 @@ def run_virtually(
             taken.clear()
             session.answer(one.answer, now_s, submit)
             for job in taken:
-                session.decide(job, judged(job), now_s)
+                session.decide(job, judged(job), now_s, submit)
         ask = session.tick(now_s, row)
         if ask is not None:
             if (answer := sample(ask)) is not None:

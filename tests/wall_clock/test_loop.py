@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from genpolicy.wall_clock import loop as loop_module
+from genpolicy.wall_clock.asked import Tally
 from genpolicy.wall_clock.channel import Inbox, Outbox, frame
 from genpolicy.wall_clock.loop import SHORTEST_PERIOD, WAKES_PER_PERIOD, Loop
 from genpolicy.wall_clock.messages import Operator, Order
-from genpolicy.wall_clock.session import Tally
 
 PERIOD_S, SILENCE_S, ROWS = 0.05, 0.2, 8
 

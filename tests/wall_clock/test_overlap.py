@@ -103,19 +103,58 @@ def test_until_the_row_that_a_chunk_was_judged_for_the_one_before_goes_on(told):
     assert told.checked() == set()
 
 
-def test_a_verdict_behind_its_row_takes_nothing_from_the_chunk_that_runs(told):
+def late(told):
+    """A chunk runs, and the next one is admitted for a row that has gone by."""
     ask = told.tick()
     told.answer(ask, actions=onward(told.task, ask))
     told.decide()
     ask = until_asked(told)
     told.answer(ask, actions=onward(told.task, ask))
     told.tick()
-    told.decide()
-    assert told.session.tally.dropped == {"late_verdict": 1} and told.count("enqueue") == 1
-    assert told.session.journal.last("discard")["reason"] == "expired"
     before = told.session.stub.accepted
+    told.decide()
+    return ask, before
+
+
+def test_a_verdict_behind_its_row_is_asked_for_once_more(told):
+    """For the row that is next now, from where the arm is now; the chunk before runs on."""
+    ask, before = late(told)
+    assert told.count("enqueue") == 1 and told.session.tally.again == 1
+    assert told.jobs[0].late_rows == 2 and told.jobs[0].event_s == told.row * PERIOD_S
+    told.decide()
+    assert told.count("enqueue") == 2 and not told.session.tally.dropped
     told.tick()
     assert told.session.stub.accepted == before + 1
+    taken = told.session.journal.last("accept")
+    assert (taken["chunk_id"], taken["row"]) == (ask.invocation, 2)
+    judged = [e.payload["chunk_id"] for e in told.session.journal.events() if e.kind == "candidate"]
+    assert judged.count(ask.invocation) == 1
+    told.end()
+    assert told.checked() == set()
+
+
+def test_one_that_is_refused_behind_its_row_is_not_judged_again(told):
+    ask = told.tick()
+    far = onward(told.task, ask)
+    far[:, 1] += 0.15
+    told.answer(ask, actions=far)
+    told.tick()
+    told.decide()
+    assert told.jobs == [] and told.session.tally.again == 0
+    assert told.session.journal.last("discard")["reason"] == "infeasible"
+
+
+def test_where_no_row_is_left_a_late_verdict_takes_nothing_from_the_chunk_that_runs(
+    kit, task, checker, standing, tmp_path
+):
+    told = begin(kit, task, checker, standing, tmp_path, deadline_s=5.0)
+    ask = told.tick()
+    told.answer(ask, actions=onward(told.task, ask))
+    for _ in range(kit.HORIZONS.execution_horizon):
+        told.tick()
+    told.decide()
+    assert told.session.tally.dropped == {"late_verdict": 1} and told.count("enqueue") == 0
+    assert told.jobs == [] and told.session.journal.last("discard")["reason"] == "expired"
     told.end()
     assert told.checked() == set()
 

@@ -137,7 +137,7 @@ def test_what_is_claimed_is_asked(changes, reason, told):
 
 def test_what_could_not_be_judged_is_infeasible(told):
     told.answer(told.tick())
-    told.session.decide(told.jobs.pop(), None, 0.02)
+    told.session.decide(told.jobs.pop(), None, 0.02, told.take)
     assert told.session.journal.last("discard")["reason"] == "infeasible"
     assert told.count("candidate") == 0
 

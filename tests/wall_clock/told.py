@@ -39,7 +39,7 @@ class Told:
     def decide(self, at=0.02):
         job = self.jobs.pop(0)
         result = judge(self.task, self.checker, job)
-        self.session.decide(job, result, self.row * PERIOD_S + at)
+        self.session.decide(job, result, self.row * PERIOD_S + at, self.take)
         return result
 
     def count(self, kind):

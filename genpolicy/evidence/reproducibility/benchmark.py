@@ -31,7 +31,8 @@ from genpolicy.policies.protocol import Policy
 from genpolicy.policies.settings import SamplerConfig
 
 Array = NDArray[np.float64]
-Projection = Callable[[Proposal], object]
+Projection = Callable[[Proposal, int], object]
+"""What becomes of a proposal; the number of the observation that it was drawn for comes with it."""
 Temperature = Literal["cold", "warm"]
 
 REPLACING = JoiningSettings()
@@ -135,8 +136,8 @@ def measure_loaded(
     with run_queue() as queue:
 
         def timed(policy: NetworkPolicy | PlannerPolicy, index: int) -> dict[str, Span]:
-            row = observations[index % len(observations)][None]
-            return _spans(_Clock(queue), policy, _Asked(row, index, candidates), project, joining)
+            asked = _asked(observations, index, candidates)
+            return _spans(_Clock(queue), policy, asked, project, joining)
 
         for repeat in range(cold_repeats):
             policy = load()
@@ -187,7 +188,7 @@ def measure_running(
         own = joining_of(joining, policy)
         _evict_caches(0)
         for index in range(-1 - discarded_repeats, warm_repeats):
-            asked = _Asked(observations[index % len(observations)][None], index, candidates)
+            asked = _asked(observations, index, candidates)
             spans = _spans(_Clock(), policy, asked, project, own)
             temperature: Temperature = "warm" if index >= 0 else "cold"
             if index >= 0 or index == -1 - discarded_repeats:
@@ -209,18 +210,25 @@ def invoke(
     That plan speaks for all that it may; what it is takes no time here, and would have been drawn
     by the invocation before.
     """
-    asked = _Asked(row, repeat, candidates)
+    asked = _Asked(row, 0, repeat, candidates)
     spans = _spans(_Clock(), policy, asked, project, joining)
     return {name: span.seconds for name, span in spans.items()}
 
 
 @dataclass(frozen=True)
 class _Asked:
-    """One observation (1, H_o, D_o), which invocation, and how many candidates it draws."""
+    """One observation (1, H_o, D_o), its number, which invocation, and how many candidates."""
 
     row: Array
+    place: int
     repeat: int
     candidates: int
+
+
+def _asked(observations: Array, repeat: int, candidates: int) -> _Asked:
+    """Observations are taken in turn."""
+    place = repeat % len(observations)
+    return _Asked(observations[place][None], place, repeat, candidates)
 
 
 class _Clock:
@@ -269,7 +277,7 @@ def _spans(
         proposal = join(drawn, 0, votes, joining)
     if project is not None:
         with clock.timed(Term.PROJECT):
-            project(proposal)
+            project(proposal, asked.place)
     return clock.spans
 
 

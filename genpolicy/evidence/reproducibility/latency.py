@@ -188,22 +188,19 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     observations = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
-    contexts = [context_at_rest(task, checker, row[-1]) for row in observations]
     period_s = plan.horizons.action_period_s
-    calls = 0
 
-    def project(proposal: Proposal) -> object:
-        nonlocal calls
-        row = calls % len(observations)
-        calls += 1
+    def project(proposal: Proposal, place: int) -> object:
+        """All that is done before an answer may be used: the state of the arm is found, too."""
+        seen = observations[place][-1]
         recorded = recorded_proposal(
             task,
             proposal.actions,
-            observations[row][-1],
+            seen,
             action_period_s=period_s,
             chunk_id=proposal.metadata.chunk_id,
         )
-        return checker.admit(recorded, context=contexts[row])
+        return checker.admit(recorded, context=context_at_rest(task, checker, seen))
 
     if isinstance(judged, BroughtPolicy):
         return measure_running(

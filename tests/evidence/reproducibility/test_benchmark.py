@@ -10,7 +10,7 @@ from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.evidence.reproducibility.benchmark import invoke, measure_policy
 from genpolicy.policies.fixtures import fixture_observations
-from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.policy import NetworkPolicy, load_policy
 from tests.candidates.conftest import entry_of, serving  # noqa: F401
 from tests.candidates.wire.test_remote import Planted
 
@@ -33,7 +33,7 @@ def test_components_and_temperatures(fleet, method, observations):
         cold_repeats=2,
         warm_repeats=3,
         discarded_repeats=1,
-        project=projected.append,
+        project=lambda proposal, place: projected.append((proposal, place)),
     )
     found = {(row.component, row.temperature, row.repeat) for row in rows}
     assert found == {
@@ -44,7 +44,24 @@ def test_components_and_temperatures(fleet, method, observations):
     }
     assert all(row.seconds > 0 for row in rows)
     assert len(projected) == 6
-    assert projected[0].selected_by == "first_admissible"
+    assert projected[0][0].selected_by == "first_admissible"
+
+
+def test_a_chunk_is_judged_where_it_was_drawn_for(fleet, observations):
+    """However many are cold: the first warm one is of the first observation again."""
+    judged, folder = [], fleet[0] / "bc" / "seed_0"
+    measure_policy(
+        folder, observations, expected_sha256=None, device="cpu", cold_repeats=3,
+        warm_repeats=5, discarded_repeats=1,
+        project=lambda proposal, place: judged.append((proposal.actions, place)),
+    )  # fmt: skip
+    policy = load_policy(folder, expected_sha256=None, device="cpu")
+    names = [("any", place) for place in range(len(observations))]
+    chunks = policy.sample(observations, noise_names=names, candidates=1).actions[:, 0]
+    assert [place for _, place in judged] == [0, 1, 2, 0, 1, 2, 3, 0, 1]
+    assert len(np.unique(chunks, axis=0)) == len(observations)
+    for actions, place in judged:
+        assert np.abs(actions - chunks[place]).max() < 1e-5
 
 
 @pytest.mark.parametrize(
@@ -65,7 +82,8 @@ def test_what_is_timed_is_joined_as_it_is_deployed(fleet, observations, monkeypa
     measure_policy(
         fleet[0] / method / "seed_0", observations, expected_sha256=None, device="cpu",
         cold_repeats=1,
-        warm_repeats=1, discarded_repeats=0, candidates=2, project=proposed.append,
+        warm_repeats=1, discarded_repeats=0, candidates=2,
+        project=lambda proposal, _: proposed.append(proposal),
         joining=JoiningSettings(rule=rule),
     )  # fmt: skip
     assert len(given) == len(proposed) == 2  # no sample beside those that are timed

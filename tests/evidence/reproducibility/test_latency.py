@@ -27,6 +27,7 @@ from genpolicy.evidence.reproducibility.latency import (
 from genpolicy.evidence.reproducibility.processor import Machine
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.seeds import stream
 
@@ -240,3 +241,24 @@ def test_a_planner_is_timed_like_everybody_and_what_it_does_not_do_takes_hardly_
         for name in ("encode", "sample")
     }
     assert took["encode"] < took["sample"]
+
+
+def test_a_chunk_is_judged_from_the_arm_that_it_was_planned_for(dataset, monkeypatch):
+    """In another one's place it is refused by the first layers, which takes half of the time."""
+    found, plain = [], FeasibilityChecker.admit
+
+    def spied(self, proposal, *, context):
+        found.append(plain(self, proposal, context=context))
+        return found[-1]
+
+    monkeypatch.setattr(FeasibilityChecker, "admit", spied)
+    horizons = HorizonConfig(
+        observation_horizon=2, prediction_horizon=16, execution_horizon=8, action_period_s=0.05
+    )
+    plan = LatencyPlan(
+        dataset=dataset, task="tabletop_insertion", feasibility=FeasibilitySettings(),
+        horizons=horizons, samples=4, warm=20, cold=3,
+    )  # fmt: skip
+    measure_terms(plan, planned(plan.task, horizons, seed=0))
+    assert len(found) == 33
+    assert sum(isinstance(one, Admitted) for one in found) == 33
