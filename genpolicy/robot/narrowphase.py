@@ -3,6 +3,7 @@
 FCL answers "free" for NaN, so nothing non-finite and no improper rotation may reach it.
 """
 
+import math
 from typing import Any
 
 import fcl
@@ -32,6 +33,8 @@ class NarrowPhase:
         ]
         self._inflated: dict[tuple[int, int], Any] = {}
         self._plain = [fcl.CollisionObject(fcl_geometry(s, inflation_m=0.0)) for s in shapes.scene]
+        self._standing: SceneState | None = None
+        self._stands: set[int] = set()
 
     def test(
         self,
@@ -55,8 +58,7 @@ class NarrowPhase:
             depth = penetration(robot, second)
             return None if depth is None else (name, self.shapes.robot[other].name, depth)
         for member in self._members[body]:
-            place(self._plain[member], *self.scene_placement(scene, member))
-            depth = penetration(robot, self._plain[member])
+            depth = penetration(robot, self._scene_object(scene, member))
             if depth is not None:
                 return name, self.shapes.scene[member].name, depth
         return None
@@ -69,8 +71,8 @@ class NarrowPhase:
         robot, deepest = self._object(shape, 0.0), 0.0
         place(robot, *self.placement(frames, i, opening_m, shape))
         for member in self._members[body]:
-            place(self._plain[member], *self.scene_placement(scene, member))
-            deepest = max(deepest, penetration(robot, self._plain[member]) or 0.0)
+            found = penetration(robot, self._scene_object(scene, member))
+            deepest = max(deepest, found or 0.0)
         return deepest
 
     def placement(
@@ -91,6 +93,15 @@ class NarrowPhase:
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return turn @ part.rotation, position + turn @ part.position_m
+
+    def _scene_object(self, scene: SceneState, shape: int) -> Any:
+        """FCL object of a scene shape where it stands; placed once for as long as one is asked."""
+        if scene is not self._standing:
+            self._standing, self._stands = scene, set()
+        if shape not in self._stands:
+            place(self._plain[shape], *self.scene_placement(scene, shape))
+            self._stands.add(shape)
+        return self._plain[shape]
 
     def _object(self, shape: int, inflation_m: float) -> Any:
         """FCL object of a robot shape, inflated to the next quarter of a millimetre or more."""
@@ -125,12 +136,21 @@ def place(target: Any, rotation: Array, position_m: Array) -> None:
         NonFiniteError: A number is not finite.
         ContractError: The rotation is none.
     """
-    require_finite(rotation, position_m)
-    skew = np.max(np.abs(rotation.T @ rotation - np.eye(3)))
-    if not (skew <= ROTATION_TOLERANCE and np.linalg.det(rotation) > 0):
+    # Numbers one by one: on nine of them NumPy's calls take twenty times as long, and a motion
+    # that passes close by asks this thousands of times.
+    a, b, c, d, e, f, g, h, i = entries = rotation.ravel().tolist()
+    if not all(map(math.isfinite, (*entries, *position_m.tolist()))):
+        require_finite(rotation, position_m)
+    skew = max(
+        abs(a * a + d * d + g * g - 1.0), abs(b * b + e * e + h * h - 1.0),
+        abs(c * c + f * f + i * i - 1.0), abs(a * b + d * e + g * h),
+        abs(a * c + d * f + g * i), abs(b * c + e * f + h * i),
+    )  # fmt: skip
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    if not (skew <= ROTATION_TOLERANCE and determinant > 0):
         raise ContractError(
             where="a placement for FCL",
-            found=f"not a rotation (error {skew:.1e}, determinant {np.linalg.det(rotation):.3f})",
+            found=f"not a rotation (error {skew:.1e}, determinant {determinant:.3f})",
             expected="orthonormal with determinant 1",
             action="Reject the whole chunk and hold.",
         )

@@ -1,4 +1,4 @@
-"""None"""
+"""Driving `dvc repro`: refusals, faults of the machine, and interrupts."""
 
 import importlib.util
 import os

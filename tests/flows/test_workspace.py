@@ -1,4 +1,4 @@
-"""None"""
+"""Workspaces: overrides of parameters, and what is copied and refreshed."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""None"""
+"""Collisions of whole arms: where shapes stand, what is swept, and what may touch."""
 
 import mujoco
 import numpy as np

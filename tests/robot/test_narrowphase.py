@@ -7,6 +7,7 @@ import pytest
 from near import HOME, paths_of, solve
 
 from genpolicy.errors import ContractError, NonFiniteError
+from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.narrowphase import penetration, place
 from genpolicy.robot.scene_state import SceneState
 
@@ -87,8 +88,25 @@ def test_fcl_calls_nan_free_and_so_it_never_sees_one(arm, model):
 
 
 @pytest.mark.parametrize(
-    "rotation", [np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), np.eye(3) * 1.001]
-)
+    "rotation",
+    [
+        np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), np.eye(3) * 1.001,
+        np.eye(3) + 1e-3 * np.eye(3, k=1), np.eye(3) + 1e-3 * np.eye(3, k=2),
+        np.eye(3)[[1, 0, 2]],
+    ],
+)  # fmt: skip
 def test_an_improper_rotation_is_refused(rotation):
     with pytest.raises(ContractError, match="orthonormal with determinant 1"):
         place(fcl.CollisionObject(fcl.Box(1, 1, 1)), rotation, np.zeros(3))
+
+
+def test_what_stands_elsewhere_is_asked_where_it_stands(arm, model, random_scene, scene_path):
+    """A scene is placed once for as long as it is asked about; another one is another."""
+    rng = np.random.default_rng(3)
+    q = near_configurations(arm, rng, 40)
+    scenes = [random_scene(rng) for _ in range(4)]
+    alone = [[CollisionModel(scene_path, arm).in_collision(row, one) for row in q] for one in scenes]
+    assert len({tuple(hit is None for hit in found) for found in alone}) == len(scenes)
+    for at, row in enumerate(q):
+        for found, scene in zip(alone, scenes, strict=True):
+            assert model.in_collision(row, scene) == found[at]

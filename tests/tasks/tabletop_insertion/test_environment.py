@@ -1,4 +1,4 @@
-"""None"""
+"""The Gymnasium environment: its interface, seeds, and refusals."""
 
 import warnings
 

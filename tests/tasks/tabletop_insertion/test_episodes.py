@@ -1,4 +1,4 @@
-"""None"""
+"""Recorded episodes: recoveries and failures are what their labels say, and replay."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""None"""
+"""The scene file: one geometry for both libraries, variants, and poses that can be reached."""
 
 import mujoco
 import numpy as np

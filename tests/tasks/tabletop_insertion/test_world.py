@@ -1,4 +1,4 @@
-"""None"""
+"""The simulated world: its determinism, and what it calls a success."""
 
 from dataclasses import replace
 
