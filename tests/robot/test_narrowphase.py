@@ -105,7 +105,8 @@ def test_what_stands_elsewhere_is_asked_where_it_stands(arm, model, random_scene
     rng = np.random.default_rng(3)
     q = near_configurations(arm, rng, 40)
     scenes = [random_scene(rng) for _ in range(4)]
-    alone = [[CollisionModel(scene_path, arm).in_collision(row, one) for row in q] for one in scenes]
+    apart = [(CollisionModel(scene_path, arm), scene) for scene in scenes]
+    alone = [[own.in_collision(row, scene) for row in q] for own, scene in apart]
     assert len({tuple(hit is None for hit in found) for found in alone}) == len(scenes)
     for at, row in enumerate(q):
         for found, scene in zip(alone, scenes, strict=True):
