@@ -32,6 +32,13 @@ ARTIFACTS = Path("artifacts")
 TIMES = Path("build/times")
 SILENT = ("latency", "wall_clock")
 """Stages that measure time: nothing else runs in their process meanwhile."""
+DEAD_WORKER = ("BrokenProcessPool", "KilledWorker")
+"""By name: of a cluster's error nobody here knows the module before there is a cluster."""
+KILLED = (
+    "a process that worked for this stage was killed: by the machine, for memory, or by somebody. "
+    "Nothing is half-written; run it again, with fewer `compute.workers` if memory was short."
+)
+OURS = "this is a fault of genpolicy, not of your input. Report the lines above."
 TRAINS, RARELY_S = "train_", 60.0
 """Stages whose processes say how far they are; how often the stage itself speaks beside them."""
 
@@ -144,12 +151,10 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         print(f"{name}: {error}", file=sys.stderr)
         _record(name, started, error.exit_code)
         sys.exit(error.exit_code)
-    except Exception:
+    except Exception as error:
         traceback.print_exc()
-        print(
-            f"{name}: this is a fault of genpolicy, not of your input. Report the lines above.",
-            file=sys.stderr,
-        )
+        said = KILLED if type(error).__name__ in DEAD_WORKER else OURS
+        print(f"{name}: {said}", file=sys.stderr)
         _record(name, started, 1)
         sys.exit(1)
     _record(name, started, 0)

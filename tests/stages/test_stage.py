@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import re
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
@@ -174,11 +175,16 @@ def fault(_):
     raise ZeroDivisionError("boom")
 
 
+def worker_died(_):
+    raise BrokenProcessPool("A process in the pool was terminated.")
+
+
 @pytest.mark.parametrize(
     ("work", "code", "sentence"),
     [
         (lambda _: None, 0, ""),
         (fault, 1, "record: this is a fault of genpolicy, not of your input. Report the lines"),
+        (worker_died, 1, "record: a process that worked for this stage was killed"),
         (bad_input, 2, "record: file is this, expected that. Mend it.\n"),
         (
             refusal, 3,
@@ -192,7 +198,7 @@ def test_exit_codes_mean_one_thing_each(workspace, capsys, work, code, sentence)
         main("record", work)
     assert end.value.code == code
     said = capsys.readouterr().err
-    assert sentence in said
+    assert sentence in said and ("fault of genpolicy" in said) == (work is fault)
     assert ("Traceback" in said) == (code == 1)
     times = json.loads((workspace / "build" / "times" / "record.json").read_text())
     assert (times["stage"], times["exit_code"]) == ("record", code)
