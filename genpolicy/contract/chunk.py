@@ -186,11 +186,12 @@ def raw_actions(values: object) -> Array:
     """A read-only float64 copy of what a policy answered, whatever it is.
 
     What is no array of real numbers (text, bytes, objects, complex numbers, one number, rows of
-    unequal length) is an array without a row: the first layer rejects it, and nothing is raised.
+    unequal length, what fails when it is asked) is an array without a row: the first layer rejects
+    it, and nothing is raised.
     """
     try:
         found = np.asarray(values)
-    except (TypeError, ValueError):
+    except Exception:  # an object's own `__array__` may raise anything
         found = np.zeros((0, 0))
     real = found.dtype.kind in "fiu" and found.ndim > 0
     return frozen_array(found if real else np.zeros((0, 0)))

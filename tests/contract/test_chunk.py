@@ -79,10 +79,18 @@ def test_the_hash_of_actions_is_that_of_their_bytes():
     assert frozen_array(np.array([1, 2])).dtype == np.float64
 
 
+class Hostile:
+    """Not to be had as an array, and not by an error that NumPy would raise."""
+
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("no array today")
+
+
 @pytest.mark.parametrize(
     "answer",
     ["text", b"\x00" * 80, None, [[1.0], [1.0, 2.0]], 3.0, np.ones((4, 10), dtype=complex),
-     np.array([[None] * 10]), np.ones((4, 10), dtype=bool), object()],
+     np.array([[None] * 10]), np.ones((4, 10), dtype=bool), object(),
+     Hostile()],
 )  # fmt: skip
 def test_what_is_no_array_of_numbers_has_no_row_and_raises_nothing(answer):
     assert Proposal(METADATA, answer, "first").actions.shape == (0, 0)
