@@ -40,8 +40,13 @@ STATES = (
     ("supervisor", "/journal/supervisor.state"),
     ("recovery", "/journal/recovery.new"),
 )
-DISTANCE_M = 1.2
-"""From the eye to the middle of the workspace."""
+DISTANCE_M, BESIDE_DEG = 1.6, 135
+"""From the eye to the middle of the workspace, and how far it stands round: in front of the arm,
+which else hides what it does."""
+FRAMES = {"showLabel": False, "axisScale": 0.1}
+"""How frames are drawn: as a viewer has it by itself, an arrow is 1 m long and its name hides the
+cell."""
+LEGEND_PX = 150
 
 
 def panels(topics: Collection[str], *, joint_count: int, workspace: Workspace) -> Json:
@@ -91,12 +96,14 @@ def _cell(topics: Iterable[str], workspace: Workspace) -> Json:
     ends = zip(workspace.lower_m, workspace.upper_m, strict=True)
     return {
         "cameraState": {
-            "perspective": True, "distance": DISTANCE_M, "phi": 60, "thetaOffset": 60,
+            "perspective": True, "distance": DISTANCE_M, "phi": 60,
+            "thetaOffset": BESIDE_DEG,
             "target": [0, 0, 0], "targetOffset": [(low + high) / 2 for low, high in ends],
             "targetOrientation": [0, 0, 0, 1], "fovy": 45, "near": 0.01, "far": 100,
         },
         "followMode": "follow-none", "followTf": FRAME,
-        "scene": {}, "transforms": {}, "layers": {}, "publish": {}, "imageMode": {},
+        "scene": {"transforms": FRAMES}, "transforms": {},
+        "layers": {}, "publish": {}, "imageMode": {},
         "topics": {topic: {"visible": True} for topic in topics},
     }  # fmt: skip
 
@@ -104,9 +111,9 @@ def _cell(topics: Iterable[str], workspace: Workspace) -> Json:
 def _plot(paths: Paths, topics: Collection[str]) -> Json:
     return {
         "paths": _paths(paths, topics),
-        "xAxisVal": "timestamp", "isSynced": True, "showLegend": True, "legendDisplay": "floating",
+        "xAxisVal": "timestamp", "isSynced": True, "showLegend": True, "legendDisplay": "left",
         "showXAxisLabels": True, "showYAxisLabels": True, "showPlotValuesInLegend": True,
-        "sidebarDimension": 240,
+        "sidebarDimension": LEGEND_PX,
     }  # fmt: skip
 
 

@@ -91,3 +91,12 @@ def test_a_line_for_each_joint_and_the_eye_on_the_middle(layout, task):
     middle = [(a + b) / 2 for a, b in zip(task.workspace.lower_m, task.workspace.upper_m,
                                           strict=True)]  # fmt: skip
     assert layout["configById"]["3D!cell"]["cameraState"]["targetOffset"] == middle
+
+
+def test_what_frames_are_drawn_with_hides_neither_cell_nor_lines(layout):
+    """A viewer by itself draws an arrow of 1 m and a name of .2 m at each frame, in a cell of 1 m;
+    a legend that floats lies over the lines."""
+    frames = layout["configById"]["3D!cell"]["scene"]["transforms"]
+    assert frames["showLabel"] is False and frames["axisScale"] <= 0.2
+    plots = [one for name, one in layout["configById"].items() if name.startswith("Plot!")]
+    assert len(plots) == 4 and {plot["legendDisplay"] for plot in plots} == {"left"}
