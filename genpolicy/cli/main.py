@@ -1,7 +1,13 @@
 """The program `genpolicy`: the commands of this package, and those that others register."""
 
+import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+
+from genpolicy.cli.kernel_cache import find_a_place
+
+PACKAGE = Path(__file__).parents[1]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -13,6 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
+    find_a_place(PACKAGE, os.environ)
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         from genpolicy.cli.commands import program  # noqa: PLC0415 - typer may be what is broken
