@@ -18,6 +18,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from genpolicy.cli.encoding import escape_what_it_lacks
 from genpolicy.errors import BadInputError, GenpolicyError
 
 GROUP = "genpolicy.commands"
@@ -116,6 +117,7 @@ def run_program(
     Returns:
         The exit code.
     """
+    escape_what_it_lacks((sys.stdout, sys.stderr))
     words = list(sys.argv[1:] if arguments is None else arguments)
     place = program
     try:
