@@ -55,7 +55,7 @@ from gates.pages.desk_gates import exhibits_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, words
-from gates.pages.numbers import at_its_end, judged_at, limit_said, recounted, rests_on
+from gates.pages.numbers import at_its_end, judged_at, limit_said, recounted
 from gates.pages.rows import CRITERIA, Rows, rows_of
 from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.readable import human
@@ -289,7 +289,6 @@ def _render(template: str, **values: Any) -> str:
         judged_at=judged_at,
         limit_said=limit_said,
         at_its_end=at_its_end,
-        rests_on=rests_on,
         recounted=recounted,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
         **values,

@@ -19,10 +19,13 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from gates.pages.numbers import rests_on
 from gates.pages.rows_files import RowsFile, lines_of, sampled, whole_or_counted
+from gates.pages.rows_led_to import led_to
 from gates.pages.rows_signed import signature_rows
 from gates.report import Answer, GateReport, report_path
-from gates.stress.rollouts import ROLLOUTS, STRESS
+from gates.stress.rollouts import ROLLOUTS
+from gates.words import number
 from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_bytes_of, sha256_file
@@ -37,8 +40,6 @@ CRITERIA = "criteria.csv"
 ARTIFACTS = "artifacts/"
 COMPARED = (ROLLOUTS,)
 """Tables in which a candidate is held against others, so that rows of all methods count."""
-ROLLOUT = ("method", "perturbation", "start")
-"""What names a rollout, in the order of its name."""
 MISSING = "missing, it is not built here"
 ALTERED = "what lies here has other bytes than were judged"
 OTHERS = "none of a candidate of this gate"
@@ -77,6 +78,22 @@ class Rows:
         if answer.candidate is None:
             return found
         return [file for file in found if file.method in ("", answer.candidate)]
+
+    def rests_on(self, answer: Answer) -> str:
+        """What a number rests on: the units that it counts, else the rows that it was taken from.
+
+        A largest deviation or a question of yes or no counts no units, but was asked of so many
+        rows; empty where it counts none and read no table, or none that lies here.
+        """
+        tables = {file.path: 0 for file in self.under(answer) if file.path.endswith(".parquet")}
+        for file in self.under(answer):
+            if file.path in tables:
+                tables[file.path] += file.of
+        if answer.counted or not tables:
+            return rests_on(answer.counted)
+        found = sum(tables.values())
+        rows = f"{number(found)} row{'' if found == 1 else 's'}"
+        return rows if len(tables) == 1 else f"{rows} of {len(tables)} tables"
 
     def recounted(self, answer: Answer) -> RowsFile | None:
         """The file in which a number is counted again: whole, or folded; None where it is not."""
@@ -223,9 +240,7 @@ def _split(wanted: _Wanted) -> tuple[RowsFile, ...]:
         return (sampled(path, "", f"{base}.csv", pa.Table.from_pylist(places, schema=DOCUMENT)),)
     table = table_of(data, where=path)
     names = [field.name for field in table.schema if not pa.types.is_nested(field.type)]
-    table = table.select(names)
-    if path.startswith(f"{STRESS}/") and set(ROLLOUT) <= set(names):
-        table = table.append_column("rollout", [_rollouts(table, wanted.played)])
+    table = led_to(path, table.select(names), wanted.played)
     if "method" not in names:
         return tuple(whole_or_counted(path, "", base, table, wanted.counted))
     found: list[RowsFile] = []
@@ -240,19 +255,6 @@ def _plain(method: str) -> str:
     """A name that can stand in that of a file, and is no other method's."""
     plain = UNPLAIN.sub("_", method)
     return plain if plain == method else f"{plain}-{sha256_bytes(method.encode())[:8]}"
-
-
-def _rollouts(table: pa.Table, played: frozenset[str]) -> pa.Array:
-    """Name of each row's rollout, where its journal is evidence; empty elsewhere."""
-    names = [
-        f"{method}/{condition}/{start}"
-        if f"{STRESS}/journals/{method}__{condition}.mcap" in played
-        else ""
-        for method, condition, start in zip(
-            *(table.column(name).to_pylist() for name in ROLLOUT), strict=True
-        )
-    ]
-    return pa.array(names, pa.string())
 
 
 def _places(value: Any, place: str = "") -> Iterator[dict[str, str]]:

@@ -3,8 +3,10 @@
 import re
 
 import evidence
+import pandas as pd
 import pytest
 
+from gates.pages.rows import rows_of
 from gates.proof import judge
 from gates.readable import human
 from gates.writing import write_gate, write_index
@@ -51,3 +53,22 @@ def test_the_desk_and_the_page_show_what_a_number_rests_on(ladder):
     counted = next(c.counted for c in report.criteria if c.id == "admissible_share")
     for page in ("index", "gate_c"):
         assert counted in (ladder / f"reports/{page}.html").read_text()
+
+
+def test_a_number_that_counts_no_units_says_of_how_many_rows_it_is(ladder):
+    """On the desk, at its bar; what reads one document alone has no rows to count."""
+    report = write_gate(ladder, "A")
+    write_index(ladder)
+    text = (ladder / "reports/index.html").read_text()
+    rows = rows_of(ladder, report)
+    frame = pd.read_parquet(ladder / "artifacts/audit/clocks.parquet")
+    named = {c.id: c for c in report.criteria}
+    assert rows.rests_on(named["lag_spread_rows"]) == f"{len(frame)} rows"
+    assert rows.rests_on(named["clock_residual_s"]).endswith(" tables")
+    assert rows.rests_on(named["label_disagreement"]) == "none of 40 replays"
+    assert rows.rests_on(named["refused_recordings_accounted"]) == ""
+    shown = [row.partition("</tr>")[0] for row in text.split("<tr")[1:]]
+    shown = [row for row in shown if "#lag_spread_rows" in row]
+    assert len(shown) == 2, "its bar, and beside its owner's name"
+    assert f"<td>{len(frame)} rows</td>" in shown[0]
+    assert f"<small>{len(frame)} rows</small>" in shown[1]
