@@ -2,7 +2,8 @@
 
 Everything else about a journal holds for the chunks of any policy. Here a sample of invocations is
 given to the checkpoint of that name again: the same observations, the same names of the noise. The
-sample is drawn by a hash of all journals and tables of the folder (`gates.sampled`).
+sample is drawn by a hash of all journals and tables of the folder (`gates.sampled`). What a sampler
+gives up at its cap is NaN there and has to be here, whatever a processor rounds.
 """
 
 from collections import defaultdict
@@ -22,6 +23,7 @@ from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.sampled import ROLLOUTS, salt_of, some
 from gates.stated import device_of, refuse, section, training_seed
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of, loaded_on
 from genpolicy.candidates.wire.policy import WirePolicy, running
@@ -48,6 +50,8 @@ Invocation = tuple[NoiseName, bytes, bytes]
 
 TOLERANCE = 1e-5
 """Of a number of a chunk, m or without unit: what another processor may make of the same sample."""
+GIVEN_UP = "NaN throughout, as of a sampler that gave up, and it answers"
+ANSWERED = "numbers, and it gives up"
 OF_A_JOURNAL = 12
 """Candidates of a journal of Gate D that are drawn again."""
 OF_A_METHOD = 48
@@ -221,7 +225,7 @@ def _draw_again(
         folder = checkpoint_of(root, method, training_seed(params))
         if folder is None:
             refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")
-        policy = loaded_on(device, folder)
+        policy = AnsweringPolicy(loaded_on(device, folder))
         count = samples if always else candidates_of(policy, samples)
         _compare(gate, policy, items, count=count, rule=Rule(joining.named(method), rows))
 
@@ -236,10 +240,12 @@ def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, 
             refuse(gate, item.place, "drawn", f"one of {len(chunks)} candidates")
         again = chunks[item.index]
         if item.actions is None:
-            continue
-        if not _alike(again, item.actions):
-            refuse(gate, item.place, _failed(policy) or _apart(again, item.actions), limit)
-        to_the_bit = to_the_bit and np.array_equal(again, item.actions, equal_nan=True)
+            unlike = _one_is_none(item.sha256, again)
+        else:
+            unlike = "" if _alike(again, item.actions) else _apart(again, item.actions)
+            to_the_bit = to_the_bit and np.array_equal(again, item.actions, equal_nan=True)
+        if unlike:
+            refuse(gate, item.place, _failed(policy) or unlike, limit)
     for item, chunks in zip(items, drawn, strict=True):
         # Of what was refused only the hash is there. It says something where this machine rounds
         # as that one did.
@@ -299,7 +305,27 @@ def _failed(policy: Policy) -> str:
     return f"asked again without an answer ({policy.last_words})"
 
 
+def _one_is_none(sha256: str, again: Array) -> str:
+    """That one of two answers is NaN throughout and the other is not; empty where both are alike.
+
+    It needs no numbers beside the hash: of all that is NaN there is one hash.
+    """
+    given_up = sha256 == actions_sha256(np.full(again.shape, np.nan))
+    if given_up == bool(np.isnan(again).all()):
+        return ""
+    return GIVEN_UP if given_up else ANSWERED
+
+
 def _apart(one: Array, other: Array) -> str:
     if one.shape != other.shape:
         return f"of shape {other.shape}"
+    none, due = np.isnan(other), np.isnan(one)
+    if (none & ~due).any():
+        return (
+            GIVEN_UP
+            if none.all()
+            else f"NaN in {none.sum()} numbers, of which {(none & ~due).sum()} are drawn"
+        )
+    if (due & ~none).any():
+        return ANSWERED if due.all() else f"numbers where {(due & ~none).sum()} are NaN"
     return f"up to {np.nanmax(np.abs(one - other)):.3g} beside it"

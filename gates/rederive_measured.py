@@ -20,6 +20,7 @@ from gates.report import Gate
 from gates.reproducibility.settings import RELOAD
 from gates.sampled import salt_of, some
 from gates.stated import device_of, mapping, refuse, section
+from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.judged import candidates_of, loaded_on, sampling_by
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.horizons import HorizonConfig
@@ -203,12 +204,12 @@ def _brought(bench: Bench) -> Iterator[tuple[Group, Policy | None]]:
 def trained_in(
     bench: Bench, stage: str, name: str, part: str = ""
 ) -> Iterator[tuple[int, NetworkPolicy]]:
-    """Checkpoints of a name, by the number of their training seed."""
+    """Checkpoints of a name, by the number of their training seed; what they give up is NaN."""
     device, seeds = device_of(bench.params), mapping(bench.params.get("policy")).get("seeds")
     for seed in seeds if isinstance(seeds, list) else ():
         place = f"artifacts/{stage}/{name}/seed_{seed}"
         try:
-            own = loaded_on(device, bench.root / place / part)
+            own = AnsweringPolicy(loaded_on(device, bench.root / place / part))
         except (BadInputError, IntegrityError) as error:
             refuse(bench.gate, place, str(error), "the checkpoint that was measured")
         yield int(seed), own
@@ -224,7 +225,7 @@ def _by_each(
         where = f"measure_baselines.conventions.{own.method}.{convention}"
         samplers[convention] = parse_settings(SamplerConfig, sampler, where=where)
     for convention, config in samplers.items():
-        yield (name, seed, convention), sampling_by(own, config)
+        yield (name, seed, convention), AnsweringPolicy(sampling_by(own, config))
 
 
 def _some_of(held_out: HeldOut, table: Path) -> HeldOut:

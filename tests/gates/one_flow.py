@@ -38,7 +38,7 @@ STARTS = matched_starts(TASK, root_seed=PARAMS["seed"], count=4)
 SAMPLES = 2
 
 
-def train_flow(folder, *, seed):
+def train_flow(folder, *, seed, sampler=None):
     """A flow that barely moves from where it is, to either side."""
     rng = stream(2, "windows")
     worlds = [TASK.make_world(s, settings=WorldSettings(TASK.calibration_epochs[-1]))
@@ -60,7 +60,7 @@ def train_flow(folder, *, seed):
         ),
         head=HeadConfig(posterior_width=16),
         training=TrainingConfig(updates=60, batch_size=64, learning_rate=3e-3, warmup_updates=5),
-        sampler=SamplerConfig(name="euler", steps=2),
+        sampler=sampler or SamplerConfig(name="euler", steps=2),
         provenance=Provenance(
             dataset_manifest_sha256="a" * 64, action_contract_sha256="b" * 64,
             observation_contract_sha256="c" * 64,
@@ -74,7 +74,13 @@ def folder_of(root):
     return root / "artifacts" / "train_generators" / "flow" / "seed_0"
 
 
-def roll_out(path, checkpoint, *, joining=None, starts=4, **execution):
+def roll_out(path, checkpoint, **more):
+    """The journal of a shard of rollouts, as `rolled_out`."""
+    rolled_out(path, checkpoint, **more)
+    return path
+
+
+def rolled_out(path, checkpoint, *, joining=None, starts=4, **execution):
     """A shard of rollouts under slower commands than the policy would give; some are refused."""
     folder, sha256 = checkpoint
     comparison = Comparison(
@@ -94,8 +100,7 @@ def roll_out(path, checkpoint, *, joining=None, starts=4, **execution):
         {name: np.full(8, 0.004) for name in MEASURED_TERMS}, 0.0,
     )  # fmt: skip
     judged = JudgedPolicy("flow", 0, folder, sha256, "cpu")
-    run_shard(Shard(comparison, judged, times, "envelope", slow, path))
-    return path
+    return run_shard(Shard(comparison, judged, times, "envelope", slow, path))
 
 
 def roll_out_planned(path):

@@ -189,8 +189,6 @@ def test_an_invocation_that_cannot_be_read_is_bad_input(root, params, journals, 
 def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
     root, params, journals, monkeypatch
 ):
-    load = module.loaded_on
-
     class Rounds:
         """A policy on a processor that rounds by so much."""
 
@@ -203,9 +201,9 @@ def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
             return replace(drawn, actions=drawn.actions + self.by)
 
     monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
-    monkeypatch.setattr(module, "loaded_on", lambda *at: Rounds(load(*at), 9e-6))
+    monkeypatch.setattr(module, "AnsweringPolicy", lambda own: Rounds(own, 9e-6))
     rederive_rollout_draws(root, params, journals[:1])
-    monkeypatch.setattr(module, "loaded_on", lambda *at: Rounds(load(*at), 1.1e-5))
+    monkeypatch.setattr(module, "AnsweringPolicy", lambda own: Rounds(own, 1.1e-5))
     with pytest.raises(RefusedError, match=r"up to 1\.1e-05 beside it" + LIMIT):
         rederive_rollout_draws(root, params, journals[:1])
 

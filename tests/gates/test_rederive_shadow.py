@@ -123,6 +123,7 @@ def root(written, moments, data, tmp_path, monkeypatch):
     monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
     demonstrator = Demonstrator(moments[1])
     monkeypatch.setattr("gates.rederive_draws.loaded_on", lambda *_: demonstrator)
+    monkeypatch.setattr("gates.rederive_draws.AnsweringPolicy", lambda own: own)
     monkeypatch.setattr("gates.rederive_draws.load_dataset", lambda folder: data)
     return shutil.copytree(written, tmp_path / "repo")
 
