@@ -141,6 +141,7 @@ LISTINGS = (
         "their widths squared and added, each end at the alpha of one candidate) and takes what "
         "trainings are worth as normal: three trainings cannot show that they are, and where one "
         "training in ten fails outright, the lower end lies too high in a quarter of all trials. "
+        "Where all starts end alike, neither end is nearer than so many starts can show. "
         "Behind it, without that assumption: how many trainings gain more than the margin, and "
         "the exact interval of the share of all trainings of the method that would. Nothing here "
         "is judged. Derived again from the journals of every training by genpolicy verify report.",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from gates.bounds import counted_interval, interval_of, mean_gain
+from gates.bounds import counted_interval, mean_gain
 from gates.engine import Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
 from gates.stress.rollouts import STRESS, StressSettings, rollouts
@@ -65,18 +65,11 @@ class Trained:
         return components(self.worth)
 
     def mean(self, confidence: float, *, success: bool = False) -> tuple[float, float, float]:
-        """Worth, or success, with its interval over trainings and starts, within 0 and 1.
-
-        Neither end is closer to 0 or 1 than so many starts of which none (or every one) is a hit.
-        """
+        """Worth, or success, with its interval over trainings and starts, within 0 and 1."""
         values = (self.success if success else self.worth).mean(axis=2)
-        mean, low, high = mean_interval(values, alpha=(1.0 - confidence) / 2.0)
-        starts = values.shape[1]
-        all_, none = (
-            interval_of(share, starts, confidence=confidence, favourable=True)
-            for share in (1.0, 0.0)
-        )
-        return mean, max(0.0, min(low, all_[0])), min(1.0, max(high, none[1]))
+        alpha = (1.0 - confidence) / 2.0
+        mean, low, high = mean_interval(values, alpha=alpha)
+        return mean, *within(mean, low, high, starts=values.shape[1], alpha=alpha, least=0.0)
 
 
 @dataclass(frozen=True)
@@ -127,6 +120,28 @@ class Claim:
         """Trainings that gain more than the margin over every simple method."""
         worst = np.min([one.of_each for one in self.gains], axis=0)
         return int(np.sum(worst > self.margin))
+
+
+def within(
+    mean: float, low: float, high: float, *, starts: int, alpha: float, least: float
+) -> tuple[float, float]:
+    """Ends within what can be, and no nearer than what so many starts cannot have shown.
+
+    Student's t has no width where all starts end alike. But a share of starts on which everything
+    ends at the worst (or the best) stays unseen on all of them with probability `alpha`: exact.
+
+    Args:
+        mean: What lies between the ends.
+        low: Lower end.
+        high: Upper end.
+        starts: How many were run.
+        alpha: Probability with which either end is wrong, in (0, 1).
+        least: The worst that a start can be worth; the best is 1.
+    """
+    unseen = 1.0 - alpha ** (1.0 / starts)
+    low = min(low, mean - unseen * (mean - least))
+    high = max(high, mean + unseen * (1.0 - mean))
+    return max(least, low), min(1.0, high)
 
 
 def path_of(seed: int, settings: StressSettings) -> str:
@@ -199,9 +214,12 @@ def claim_of(evidence: Evidence, settings: StressSettings, candidate: str) -> Cl
 
 def _gain(own: Trained, other: Trained, settings: StressSettings) -> Gain:
     gain, low, high = gain_of_methods(own.by_start, other.by_start, alpha=settings.alpha)
+    low, high = within(
+        gain, low, high, starts=own.by_start.shape[1], alpha=settings.alpha, least=-1.0
+    )
     difference = own.by_start - other.by_start.mean(axis=0)
     of_each = tuple(mean_gain(row) for row in difference)
-    return Gain(other.name, gain, max(-1.0, low), min(1.0, high), of_each)
+    return Gain(other.name, gain, low, high, of_each)
 
 
 def trainings_said(judged: Judged) -> list[str]:

@@ -10,7 +10,7 @@ from gates.claim import CHECKPOINT_ONLY, ONE_OF_SEVERAL
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.page import gate_page
 from gates.proof import judge
-from gates.stress.trainings import CLAIMED, UNCLAIMED, claim_of, over_trainings
+from gates.stress.trainings import CLAIMED, UNCLAIMED, claim_of, over_trainings, within
 from genpolicy.integrity.rows import read_rows
 
 FLOW = "flow"
@@ -66,6 +66,32 @@ def test_worth_and_gain_are_those_of_the_rows(ladder):
     assert gain.gain == pytest.approx(np.mean(own.each) - np.mean(other.each))
     assert gain.low < gain.gain < gain.high
     assert own.scatter == pytest.approx(np.std(own.each, ddof=1))
+
+
+def test_starts_that_all_end_alike_leave_what_so_many_cannot_show(ladder):
+    """Student's t has no width there: three starts would show a gain exactly."""
+    trained_more(ladder, {
+        (name, seed): (lambda start: start >= 0) if name == FLOW else (lambda start: start < 0)
+        for name in (FLOW, "bc") for seed in (0, 1, 2)
+    })  # fmt: skip
+    evidence_, settings = of(ladder)
+    gain = next(one for one in claim_of(evidence_, settings, FLOW).gains if one.baseline == "bc")
+    # Of gains between -1 and 1, all of which are 1: a share of starts at -1 that none shows.
+    unseen = 1.0 - settings.alpha ** (1.0 / evidence.STARTS)
+    assert (gain.gain, gain.high) == (1.0, 1.0)
+    assert gain.low == pytest.approx(1.0 - 2.0 * unseen)
+    own = over_trainings(evidence_, settings, FLOW)
+    mean, low, high = own.mean(0.95)
+    assert (mean, high) == (1.0, 1.0) and low == pytest.approx(0.025 ** (1.0 / evidence.STARTS))
+
+
+@pytest.mark.parametrize(("mean", "ends", "expected"), [
+    (0.0, (0.0, 0.0), (-0.5, 0.5)), (0.5, (0.5, 0.5), (-0.25, 0.75)),
+    (0.0, (-0.7, 0.9), (-0.7, 0.9)), (0.9, (-1.4, 1.6), (-1.0, 1.0)),
+])  # fmt: skip
+def test_an_interval_of_gains_is_as_wide_as_what_two_starts_cannot_have_shown(mean, ends, expected):
+    """By a quarter of probability, half of the starts may be of a kind that two never showed."""
+    assert within(mean, *ends, starts=2, alpha=0.25, least=-1.0) == pytest.approx(expected)
 
 
 def test_the_page_says_both_claims_and_every_rollout_is_bound(ladder):
