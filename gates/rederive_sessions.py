@@ -78,7 +78,7 @@ def rederive_sessions(
             return other.sha256, joining.named(method).sampler_hash(other.sampler_sha256)
         return _maker(root, method, seed, joining.named(method))
 
-    planned = _planned(params) if simulated and gate == "D" else None
+    planned = _Planned(params) if simulated and gate == "D" else None
     for path in journals:
         with readable(f"{path.parent.name}/{path.name}"):
             sessions = begun_sessions(path)
@@ -132,31 +132,40 @@ class _Start:
     q_rad: Array
 
 
-def _planned(params: Mapping[str, Any]) -> list[_Start]:
-    """Every planned start, as it is first seen."""
-    task = load_task(section(params, "task", TaskSection).name)
-    count = section(params, "stress", StressSettings).starts
-    settings = WorldSettings(calibration_epoch=task.calibration_epochs[-1])
-    found = []
-    for start in matched_starts(task, root_seed=root_seed(params), count=count):
-        world = task.make_world(start, settings=settings)
-        seen = task.scene_poses(world.observe())
-        scene = {body: np.concatenate(pose) for body, pose in seen.items()}
-        found.append(_Start(scene, np.array(world.q_meas)))
-    return found
+class _Planned:
+    """The planned starts, each made when a session of it is looked at: a world settles first."""
+
+    def __init__(self, params: Mapping[str, Any]) -> None:
+        self._task = load_task(section(params, "task", TaskSection).name)
+        count = section(params, "stress", StressSettings).starts
+        self._starts = matched_starts(self._task, root_seed=root_seed(params), count=count)
+        self._seen: dict[int, _Start] = {}
+
+    def __len__(self) -> int:
+        return len(self._starts)
+
+    def __getitem__(self, number: int) -> _Start:
+        """A planned start as it is first seen."""
+        if number not in self._seen:
+            settings = WorldSettings(calibration_epoch=self._task.calibration_epochs[-1])
+            world = self._task.make_world(self._starts[number], settings=settings)
+            seen = self._task.scene_poses(world.observe())
+            scene = {body: np.concatenate(pose) for body, pose in seen.items()}
+            self._seen[number] = _Start(scene, np.array(world.q_meas))
+        return self._seen[number]
 
 
-def _began(gate: Gate, place: str, session: Begun, planned: Sequence[_Start]) -> None:
+def _began(gate: Gate, place: str, session: Begun, planned: _Planned) -> None:
     number = int(session.labels["start"])
     seen = session.bodies or {}
     if not 0 <= number < len(planned):
         refuse(gate, f"{place}: start", str(number), f"one of the {len(planned)} that are planned")
-    expected, q_rad = planned[number].scene, session.q_rad
+    start, q_rad = planned[number], session.q_rad
+    expected, arm = start.scene, start.q_rad
     if set(seen) != set(expected) or not all(
         np.allclose(seen[body], expected[body], rtol=0.0, atol=TOLERANCE) for body in expected
     ):
         refuse(gate, f"{place}: first seen", _said(seen), f"{_said(expected)}, as planned")
-    arm = planned[number].q_rad
     if (
         q_rad is None
         or q_rad.shape != arm.shape

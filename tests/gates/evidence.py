@@ -540,8 +540,9 @@ def record(root: Path) -> None:
                 "outs": [{"path": out, "md5": disk.md5(out)} for out in outs],
             }
         stages[f"gate_{gate.lower()}"] = {"cmd": "gate", "deps": [CODE], "outs": []}
-    (root / "dvc.yaml").write_text(json.dumps({"stages": stages}))
-    (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}))
+    # In lines: of a text in one line the reader takes the depth for its length (the slow parser).
+    (root / "dvc.yaml").write_text(json.dumps({"stages": stages}, indent=0))
+    (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}, indent=0))
 
 
 @functools.lru_cache(maxsize=4)
