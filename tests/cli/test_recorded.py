@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "audit"))
 
 from planar import planar
 
+from genpolicy.audit import learned
 from genpolicy.audit.data import canonical
 from genpolicy.audit.variable import numbered
 from genpolicy.cli.main import main
@@ -23,6 +24,12 @@ EPISODES = 100
 RATE_HZ = 10
 SIDES = ("left", "right", "over")
 STATE = ("x_m", "y_m", "goal_x_m", "goal_y_m")
+
+
+@pytest.fixture(autouse=True)
+def _few_learned(monkeypatch):
+    """A sixth of the situations that are asked by what predicts the action: half of the time."""
+    monkeypatch.setattr(learned, "QUERIES", 100)
 
 
 @pytest.fixture(scope="module")
