@@ -1,17 +1,18 @@
 """What was made before of the same bytes: answers of criteria and figures of pages, given again.
 
-Both are functions of the files that they read and of what else they are given. Most tests change
-one file of a whole ladder and judge or print all of it, and what did not read that file is as it
-was. So within one process it is given again where every file that it read has the same hash as
-then, the same files lie there, and those of each training (which are found by pattern) are the
-same; where any differs, and in every test that puts something else in the place of a function or a
-constant, it is made. A function that asks for nothing and always answers the same is told apart by
-its code, so that what was made with it in a place is given again where it stands there again.
+So is what Gate B says of its two rules of training. All of them are functions of the files that
+they read and of what else they are given. Most tests change one file of a whole ladder and judge or
+print all of it, and what did not read that file is as it was. So within one process it is given
+again where every file that it read has the same hash as then, the same files lie there, and those
+of each training (which are found by pattern) are the same; where any differs, and in every test
+that puts something else in the place of a function or a constant, it is made. A function that asks
+for nothing and always answers the same is told apart by its code, so that what was made with it in
+a place is given again where it stands there again.
 `FRESH=1` makes everything always.
 """
 
 import os
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
@@ -21,10 +22,16 @@ import pytest
 from gates import engine
 from gates.criterion import Criterion
 from gates.evidence import Evidence
+from gates.need.settings import TRAINED as BASELINES
 from gates.pages.figures import Listing, Plot, Series
 from gates.report import Answer, GateReport
+from gates.reproducibility import gate as gate_b
+from gates.reproducibility.convergence import has_training
+from gates.reproducibility.matching import matched_by
+from gates.reproducibility.settings import GENERATORS
 from gates.settings import GateSettings, Limit
 from genpolicy.integrity.hashing import sha256_file
+from genpolicy.policies.validation_row import VALIDATION_FILE
 
 Made = TypeVar("Made")
 MISSING = ""
@@ -54,6 +61,7 @@ def nothing_made_twice() -> Iterator[None]:
         return
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(engine, "_answer", answer)
+        patch.setattr(gate_b, "matched_by", matched)
         for kind in PICTURED:
             patch.setattr(kind, "picture", picture)
         for name in ("setattr", "setitem"):
@@ -114,6 +122,34 @@ def picture(plot: Any, evidence: Evidence, report: GateReport, salt: str) -> dic
     """In the place of `picture` of what a page shows."""
     key = (plot, _in_words(report), salt)
     return _again(key, evidence, lambda: _picture[type(plot)](plot, evidence, report, salt))
+
+
+def matched(
+    evidence: Evidence,
+    *,
+    candidates: Sequence[str],
+    baselines: Sequence[str],
+    limit: float | None,
+    confidence: float,
+) -> list[str]:
+    """In the place of `matched_by` where Gate B says what holds of both of its rules."""
+
+    def say() -> list[str]:
+        return matched_by(
+            evidence, candidates=candidates, baselines=baselines, limit=limit,
+            confidence=confidence,
+        )  # fmt: skip
+
+    key = (matched_by, tuple(candidates), tuple(baselines), limit, confidence)
+    said = _again(key, evidence, say)
+    if limit is None or any("not measured" in sentence for sentence in said):
+        return say()  # it ended before it had bound all
+    stages = {BASELINES: [name for name in baselines if has_training(evidence, name)]}
+    for root, names in {**stages, GENERATORS: candidates}.items():
+        for name in names:  # found by pattern, and so not among what was read
+            folder = f"{root}/{name}/seed_*"
+            evidence.bind(f"{folder}/{VALIDATION_FILE}", f"{folder}/model.safetensors")
+    return list(said)
 
 
 def _again(key: Hashable, evidence: Evidence, make: Callable[[], Made]) -> Made:

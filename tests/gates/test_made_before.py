@@ -2,6 +2,7 @@
 
 import evidence
 import made_before
+import numpy as np
 import pytest
 import yaml
 
@@ -12,7 +13,9 @@ from gates.pages.figures import Plot
 from gates.pages.printing import printed_beside
 from gates.proof import judge
 from gates.report import report_bytes
+from gates.reproducibility import gate as gate_b
 from gates.reproducibility import timing
+from gates.reproducibility.matching import matched_by
 from gates.settings import read_params
 from gates.stress import gate as stress
 from genpolicy.candidates import judged
@@ -55,6 +58,38 @@ def test_the_same_bytes_are_measured_and_drawn_once(ladder, _made):
     assert judge(ladder, "D") == report
     assert printed_beside(ladder, report) == printed
     assert _made == []
+
+
+def test_what_gate_b_says_of_its_rules_is_said_anew_where_a_training_changed(
+    ladder, _made, monkeypatch
+):
+    asked = []
+
+    def noted(*given, **named):
+        asked.append(named["candidates"])
+        return matched_by(*given, **named)
+
+    def fresh():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(gate_b, "matched_by", matched_by)
+            patch.setattr(engine, "_answer", made_before._answer)
+            return judge(ladder, "B")
+
+    monkeypatch.setattr(made_before, "matched_by", noted)
+    made_before.forget()
+    report = judge(ladder, "B")
+    assert judge(ladder, "B") == report and len(asked) == 1
+    table = "train_generators/flow/seed_0/validation.parquet"
+    evidence.edit_table(ladder, table, _half_learned)
+    changed = judge(ladder, "B")
+    assert len(asked) == 2 and any("flow, matched with" in line for line in changed.caveats)
+    assert changed.caveats != report.caveats
+    assert changed == fresh()
+
+
+def _half_learned(frame):
+    """Its loss falls to half over the last quarter of its training."""
+    return frame.assign(loss=np.where(frame["updates"] < frame["updates"].max(), 2.0, 1.0))
 
 
 def test_what_read_a_file_that_changed_is_measured_and_the_rest_is_as_it_was(ladder, _made):
