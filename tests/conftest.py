@@ -1,6 +1,7 @@
 """A small recorded dataset of the real task, and barely trained checkpoints on it."""
 
 import copy
+import gc
 import os
 import shutil
 import sys
@@ -34,6 +35,8 @@ from genpolicy.tasks.demonstrations import record_session
 sys.path.insert(0, str(Path(__file__).parent))
 from order import LONG, leave_out_long, longest_first
 
+gc.disable()  # until all tests are collected: what is imported and collected stays
+
 PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
 EXECUTION = ExecutionSettings(**PARAMS["execution"])
@@ -61,6 +64,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     longest_first(items)
     if LONG not in os.environ:
         config.hook.pytest_deselected(items=leave_out_long(items))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop() -> None:
+    """What was collected stays to the end: no later search for garbage looks at it."""
+    gc.freeze()
+    gc.enable()
 
 
 def write_situations(folder, rows):

@@ -159,3 +159,19 @@ def test_lerobot_s_environment_is_left_out_with_a_sentence_where_its_python_is_n
     said = "No Python 3.12 or 3.13 found, which LeRobot needs; skipped. Install one, or name it: "
     assert said + "make PYTHON_LEROBOT=/path/to/python3.12 lerobot" in done.stdout
     assert not (tmp_path / "build").exists()
+
+
+@pytest.mark.parametrize("told", ["", "/a place"])
+def test_tests_write_where_nothing_waits_for_a_disk_or_where_they_are_told(
+    tmp_path: Path, told: str
+) -> None:
+    asking = tmp_path / "asking.mk"
+    asking.write_text("include Makefile\nasked:\n\t@echo '$(WRITTEN_TO)'\n")
+    environment = {**os.environ, "TMPDIR": told}
+    said = subprocess.run(
+        ["make", "--silent", "-f", str(asking), "asked"], cwd=ROOT, env=environment,
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    memory = Path("/dev/shm")
+    room = memory.is_dir() and shutil.disk_usage(memory).free > 10_000_000 * 1024
+    assert said.stdout == (told or ("/dev/shm" if room else "/tmp")) + "\n"

@@ -1,5 +1,6 @@
 """Long files of tests begin first, nothing sorts them again, and long tests are left out."""
 
+import gc
 import os
 import re
 import sys
@@ -61,3 +62,8 @@ def test_one_command_runs_what_the_other_leaves_out(request) -> None:
     [long] = [line for line in lines if "-m long" in line]
     [short] = [line for line in lines if "-m pytest" in line and line != long]
     assert long.strip().startswith("@LONG=1 ") and "LONG" not in short and "-m pytest" in long
+
+
+def test_what_was_collected_is_searched_for_garbage_no_more_and_what_tests_leave_is() -> None:
+    assert gc.isenabled()
+    assert gc.get_freeze_count() > 10_000
