@@ -5,12 +5,19 @@ import pytest
 from planar import named, planar
 from written import audited_table, forms, write
 
+from genpolicy.audit import learned
 from genpolicy.audit.data import canonical
 
 SETTINGS = {"chunk_rows": 16, "persistence_lag_rows": 16, "query_stride": 3, "resamples": 20}
 # A defect of the data needs no situations.
 FEW = {**SETTINGS, "query_stride": 20}
 UNNAMED, LIKE_THE_STATE = ("action_0", "action_1"), ("action_x", "action_y")
+
+
+@pytest.fixture(autouse=True)
+def _few_learned(monkeypatch):
+    """A sixth of the situations that are asked by what predicts the action: half of the time."""
+    monkeypatch.setattr(learned, "QUERIES", 100)
 
 
 @pytest.fixture(scope="module")
