@@ -54,6 +54,11 @@ def direct(request: WallClockRequest, limits: WallClockLimits, task: Task, folde
     session = SupervisedSession(task, limits.cell, request, journal, stop_stands=False)
     actions = np.tile(request.replay.action_rows[0], (limits.horizons.prediction_horizon, 1))
     jobs: list[Job] = []
+
+    def take(job: Job) -> bool:
+        jobs.append(job)
+        return True
+
     decisions, ticks = [], []
     for row in range(ROWS):
         now_s = row * period_s
@@ -64,8 +69,8 @@ def direct(request: WallClockRequest, limits: WallClockLimits, task: Task, folde
             continue
         answer = Answer(ask.invocation, CHECKPOINT, SAMPLER, "scripted", actions)
         begin = time.perf_counter()
-        session.answer(answer, now_s, lambda job: jobs.append(job) is None)
-        session.decide(jobs[-1], judge(task, checker, jobs[-1]), now_s)
+        session.answer(answer, now_s, take)
+        session.decide(jobs[-1], judge(task, checker, jobs[-1]), now_s, take)
         decisions.append(time.perf_counter() - begin)
     session.end(ROWS * period_s)
     return decisions, ticks, session.stub.accepted

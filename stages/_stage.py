@@ -153,8 +153,8 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         sys.exit(error.exit_code)
     except Exception as error:
         traceback.print_exc()
-        said = KILLED if type(error).__name__ in DEAD_WORKER else OURS
-        print(f"{name}: {said}", file=sys.stderr)
+        why = KILLED if type(error).__name__ in DEAD_WORKER else OURS
+        print(f"{name}: {why}", file=sys.stderr)
         _record(name, started, 1)
         sys.exit(1)
     _record(name, started, 0)

@@ -10,8 +10,10 @@ anywhere; a weld from the hand to the held object, if there is one.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -312,13 +314,19 @@ class Task(Protocol):
         ...
 
 
+@cache
+def _registered(path: tuple[str, ...]) -> dict[str, EntryPoint]:
+    """Tasks by name, of what is installed there: read once, since that takes a while."""
+    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+
+
 def find_task(name: str) -> EntryPoint:
     """The entry point of the task registered as `name`; loads nothing.
 
     Raises:
         ConfigError: No task has that name; the message lists the known ones.
     """
-    found = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+    found = _registered(tuple(sys.path))
     if name not in found:
         raise ConfigError(
             where="the task's name",

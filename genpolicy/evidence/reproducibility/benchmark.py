@@ -5,9 +5,8 @@ filled with other bytes before each invocation; the first cold one of a fresh pr
 for everything that the process does once.
 """
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -24,7 +23,8 @@ from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
-from genpolicy.evidence.reproducibility.processor import RunQueue, run_queue, waited_s
+from genpolicy.evidence.reproducibility.processor import run_queue
+from genpolicy.evidence.reproducibility.spans import Span, SpanClock
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import Policy
@@ -57,14 +57,6 @@ class Measurement:
     component: str
     temperature: Temperature
     repeat: int
-    seconds: float
-    waited_s: float | None
-
-
-@dataclass(frozen=True)
-class Span:
-    """What a term took, and how much of that it waited for a processor, s; None if unknown."""
-
     seconds: float
     waited_s: float | None
 
@@ -137,7 +129,7 @@ def measure_loaded(
 
         def timed(policy: NetworkPolicy | PlannerPolicy, index: int) -> dict[str, Span]:
             asked = _asked(observations, index, candidates)
-            return _spans(_Clock(queue), policy, asked, project, joining)
+            return _spans(SpanClock(queue), policy, asked, project, joining)
 
         for repeat in range(cold_repeats):
             policy = load()
@@ -189,7 +181,7 @@ def measure_running(
         _evict_caches(0)
         for index in range(-1 - discarded_repeats, warm_repeats):
             asked = _asked(observations, index, candidates)
-            spans = _spans(_Clock(), policy, asked, project, own)
+            spans = _spans(SpanClock(), policy, asked, project, own)
             temperature: Temperature = "warm" if index >= 0 else "cold"
             if index >= 0 or index == -1 - discarded_repeats:
                 results += _measurements(temperature, max(index, 0), spans)
@@ -211,7 +203,7 @@ def invoke(
     by the invocation before.
     """
     asked = _Asked(row, 0, repeat, candidates)
-    spans = _spans(_Clock(), policy, asked, project, joining)
+    spans = _spans(SpanClock(), policy, asked, project, joining)
     return {name: span.seconds for name, span in spans.items()}
 
 
@@ -231,33 +223,8 @@ def _asked(observations: Array, repeat: int, candidates: int) -> _Asked:
     return _Asked(observations[place][None], place, repeat, candidates)
 
 
-class _Clock:
-    """Spans of one invocation; of a run queue, where it is given, what was waited in it.
-
-    A span of a term that has one already adds to it: a server behind the wire may select, too.
-    """
-
-    def __init__(self, queue: RunQueue | None = None) -> None:
-        self._queue = queue or RunQueue(None)
-        self.spans: dict[str, Span] = {}
-
-    @contextmanager
-    def timed(self, term: Term) -> Iterator[None]:
-        """Time the block as a term. The queue is read inside the span: no wait outside counts."""
-        start = time.perf_counter()
-        before = self._queue.now()
-        yield
-        after = self._queue.now()
-        seconds = time.perf_counter() - start
-        waited = waited_s(before, after, wall_s=seconds)
-        earlier = self.spans.get(str(term), Span(0.0, 0.0))
-        if waited is not None:
-            waited = None if earlier.waited_s is None else earlier.waited_s + waited
-        self.spans[str(term)] = Span(earlier.seconds + seconds, waited)
-
-
 def _spans(
-    clock: _Clock,
+    clock: SpanClock,
     policy: Running,
     asked: _Asked,
     project: Projection | None,
@@ -281,7 +248,7 @@ def _spans(
     return clock.spans
 
 
-def _drawn(clock: _Clock, policy: Running, asked: _Asked, guided: Prefix | None) -> Array:
+def _drawn(clock: SpanClock, policy: Running, asked: _Asked, guided: Prefix | None) -> Array:
     """Chunks (N, K, D_a) of an observation, and what the terms of the model took."""
     name = ("latency", asked.repeat)
     if isinstance(policy, WirePolicy):
@@ -305,7 +272,7 @@ def _drawn(clock: _Clock, policy: Running, asked: _Asked, guided: Prefix | None)
     return own
 
 
-def _planned(clock: _Clock, policy: PlannerPolicy, asked: _Asked) -> Array:
+def _planned(clock: SpanClock, policy: PlannerPolicy, asked: _Asked) -> Array:
     """Chunks (N, K, D_a) of a planner: it plans where others sample, and encodes nothing."""
     with clock.timed(Term.PREPROCESS):
         checked = policy.preprocess(asked.row)
