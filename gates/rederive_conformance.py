@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from gates.rederive_again import TOLERANCE
 from gates.rederive_brought import brought_policy
-from gates.rederive_draws import TOLERANCE
 from gates.rederive_shadow import TaskSection
 from gates.reproducibility.settings import RELOAD
 from gates.sampled import salt_of, some

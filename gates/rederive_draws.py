@@ -8,15 +8,15 @@ gives up at its cap is NaN there and has to be here, whatever a processor rounds
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gates.rederive_again import Again, Asked, draw_again, hold_hashes
 from gates.rederive_brought import brought_policy
-from gates.rederive_joined import Rule, hold_joined, prefixes_of
+from gates.rederive_joined import Rule
 from gates.rederive_planner import planner_of_ladder
 from gates.rederive_sessions import REPLACING, checkpoint_of
 from gates.rederive_shadow import TaskSection
@@ -26,9 +26,8 @@ from gates.stated import device_of, refuse, section, training_seed
 from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of, loaded_on
-from genpolicy.candidates.wire.policy import WirePolicy, running
+from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.action import ACTION_DIM
-from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.planner import PLANNER
 from genpolicy.data.dataset import Dataset, load_dataset
@@ -38,64 +37,17 @@ from genpolicy.evidence.shadow.shadow import HELD_OUT, TWO_MODES
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.journal import encode_poses
 from genpolicy.integrity.rows import read_rows
-from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.drawn import Drawn, Source, drawn_chunks
 from genpolicy.verification.journal_source import readable
-from genpolicy.verification.rejoined import Made
 
 Array = NDArray[np.float64]
-Invocation = tuple[NoiseName, bytes, bytes]
-"""Names of the noise, what was seen, and what was gone on from."""
-
-TOLERANCE = 1e-5
-"""Of a number of a chunk, m or without unit: what another processor may make of the same sample."""
-GIVEN_UP = "NaN throughout, as of a sampler that gave up, and it answers"
-ANSWERED = "numbers, and it gives up"
 OF_A_JOURNAL = 12
 """Candidates of a journal of Gate D that are drawn again."""
 OF_A_METHOD = 48
 """Observations of a method at Gate C whose candidates are drawn again."""
 SHADOW = "artifacts/shadow"
 DATASET = "artifacts/ingest"
-
-
-@dataclass(frozen=True)
-class Asked:
-    """One candidate that is drawn again.
-
-    Attributes:
-        place: Where it stands, in words.
-        source: Names of the noise, and what the policy saw.
-        index: Number of the candidate.
-        actions: What was drawn, where the numbers are there. Shape (K, 10).
-        sha256: Its hash, where only that is.
-        joined: The same as its journal states it, with what it was made of; None at Gate C.
-    """
-
-    place: str
-    source: Source
-    index: int
-    actions: Array | None
-    sha256: str = ""
-    joined: Drawn | None = None
-
-    @property
-    def invocation(self) -> Invocation:
-        """What is drawn together with it: the same noise, seen and gone on from."""
-        return _named(self.source, self.goes_on)
-
-    @property
-    def goes_on(self) -> Made | None:
-        """What it was made of, where it was drawn to go on from an earlier plan."""
-        made = self.joined.made if self.joined else None
-        return made if made is not None and made.guided else None
-
-    @property
-    def blended_from(self) -> Mapping[str, Source]:
-        """Earlier invocations that were mixed into its numbers."""
-        mixed = self.joined is not None and self.joined.blended is not None
-        return self.joined.earlier if self.joined is not None and mixed else {}
 
 
 def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequence[Path]) -> None:
@@ -211,121 +163,27 @@ def _draw_again(
     task = load_task(section(params, "task", TaskSection).name)
     rows = section(params, "horizons", HorizonConfig).prediction_horizon
     device = device_of(params)
+    found: dict[str, Again] = {}
+    networks: list[str] = []
     for method, items in sorted(asked.items()):
         if method == PLANNER:
             rule = Rule(joining.named(method), rows)
-            _compare(gate, planner_of_ladder(params).load(), items, count=1, rule=rule)
+            planner = planner_of_ladder(params).load()
+            found[method] = draw_again(gate, planner, items, count=1, rule=rule)
             continue
         other = brought_policy(root, params, method)
         if other is not None:
             with running(other, task.observation, scene=task.scene_path) as wire:
                 count = samples if always else candidates_of(wire, samples)
-                _compare(gate, wire, items, count=count, rule=Rule(joining.named(method), rows))
+                rule = Rule(joining.named(method), rows)
+                found[method] = draw_again(gate, wire, items, count=count, rule=rule)
             continue
         folder = checkpoint_of(root, method, training_seed(params))
         if folder is None:
             refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")
         policy = AnsweringPolicy(loaded_on(device, folder))
         count = samples if always else candidates_of(policy, samples)
-        _compare(gate, policy, items, count=count, rule=Rule(joining.named(method), rows))
-
-
-def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, rule: Rule) -> None:
-    by_invocation = _drawn_again(policy, items, count, rule)
-    drawn = [by_invocation[item.invocation] for item in items]
-    limit = f"what {policy.checkpoint_hash[:16]}… draws there, within {TOLERANCE:g}"
-    to_the_bit = True
-    for item, chunks in zip(items, drawn, strict=True):
-        if not 0 <= item.index < len(chunks):
-            refuse(gate, item.place, "drawn", f"one of {len(chunks)} candidates")
-        again = chunks[item.index]
-        if item.actions is None:
-            unlike = _one_is_none(item.sha256, again)
-        else:
-            unlike = "" if _alike(again, item.actions) else _apart(again, item.actions)
-            to_the_bit = to_the_bit and np.array_equal(again, item.actions, equal_nan=True)
-        if unlike:
-            refuse(gate, item.place, _failed(policy) or unlike, limit)
-    for item, chunks in zip(items, drawn, strict=True):
-        # Of what was refused only the hash is there. It says something where this machine rounds
-        # as that one did.
-        if (
-            to_the_bit
-            and item.actions is None
-            and actions_sha256(chunks[item.index]) != item.sha256
-        ):
-            said = _failed(policy) or f"drawn as {item.sha256[:16]}…"
-            refuse(gate, item.place, said, limit)
-    for item, chunks in zip(items, drawn, strict=True):
-        told = item.joined
-        if told is not None:
-            earlier = {
-                name: by_invocation[_named(source)] for name, source in item.blended_from.items()
-            }
-            hold_joined(
-                gate, item.place, told, own=chunks, earlier=earlier, joining=rule.joining
-            )  # fmt: skip
-
-
-def _drawn_again(
-    policy: Policy, items: Sequence[Asked], count: int, rule: Rule
-) -> dict[Invocation, Array]:
-    """What each invocation draws, and each that a blend rests on. Shapes (N, K, 10)."""
-    asked: dict[Invocation, tuple[Source, Made | None]] = {}
-    for item in items:
-        # Candidates of one invocation are drawn together, and once.
-        asked[item.invocation] = item.source, item.goes_on
-        for source in item.blended_from.values():
-            asked.setdefault(_named(source), (source, None))
-    with readable(items[0].place):
-        answers = policy.sample(
-            np.stack([source.history for source, _ in asked.values()]),
-            noise_names=[source.key for source, _ in asked.values()],
-            candidates=count,
-            prefix=prefixes_of([made for _, made in asked.values()], rule),
-        ).actions
-    return dict(zip(asked, answers, strict=True))
-
-
-def _named(source: Source, goes_on: Made | None = None) -> Invocation:
-    before = b"".join(one.commanded.tobytes() for one in (goes_on.said if goes_on else ()))
-    return source.key, source.history.tobytes(), before
-
-
-def _alike(one: Array, other: Array) -> bool:
-    return one.shape == other.shape and np.allclose(
-        one, other, rtol=0.0, atol=TOLERANCE, equal_nan=True
-    )
-
-
-def _failed(policy: Policy) -> str:
-    """That a process was asked again and failed, with its last words; empty where none did."""
-    if not isinstance(policy, WirePolicy) or not policy.faults:
-        return ""
-    return f"asked again without an answer ({policy.last_words})"
-
-
-def _one_is_none(sha256: str, again: Array) -> str:
-    """That one of two answers is NaN throughout and the other is not; empty where both are alike.
-
-    It needs no numbers beside the hash: of all that is NaN there is one hash.
-    """
-    given_up = sha256 == actions_sha256(np.full(again.shape, np.nan))
-    if given_up == bool(np.isnan(again).all()):
-        return ""
-    return GIVEN_UP if given_up else ANSWERED
-
-
-def _apart(one: Array, other: Array) -> str:
-    if one.shape != other.shape:
-        return f"of shape {other.shape}"
-    none, due = np.isnan(other), np.isnan(one)
-    if (none & ~due).any():
-        return (
-            GIVEN_UP
-            if none.all()
-            else f"NaN in {none.sum()} numbers, of which {(none & ~due).sum()} are drawn"
-        )
-    if (due & ~none).any():
-        return ANSWERED if due.all() else f"numbers where {(due & ~none).sum()} are NaN"
-    return f"up to {np.nanmax(np.abs(one - other)):.3g} beside it"
+        rule = Rule(joining.named(method), rows)
+        found[method] = draw_again(gate, policy, items, count=count, rule=rule)
+        networks.append(method)
+    hold_hashes(found, networks=networks)

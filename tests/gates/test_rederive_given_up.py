@@ -21,8 +21,11 @@ from one_flow import (
 from gates import rederive_draws as module
 from gates import rederive_fixtures as fixtures
 from gates import rederive_measured as measured
+from gates.rederive_again import Asked, draw_again, hold_hashes
 from gates.rederive_draws import SHADOW, rederive_rollout_draws, rederive_shadow_draws
+from gates.rederive_joined import Rule
 from gates.rederive_refused import rederive_refused
+from gates.rederive_sessions import REPLACING
 from gates.stress.rollouts import REFUSED
 from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.judged import loaded_on
@@ -41,6 +44,7 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.seeds import stream
+from genpolicy.verification.drawn import Source
 from genpolicy.verification.refused import RefusedCandidates
 from genpolicy.verification.rollouts import derived_with_recoveries, differences
 from genpolicy.verification.tables import derived_tables
@@ -49,6 +53,7 @@ ADAPTIVE = SamplerConfig(name="bosh3", steps=2, tolerance=1e-2, nfe_cap=21)
 """Of an invocation in ten one sample takes a step more than this cap allows."""
 REASON = "finite"
 NOTHING = actions_sha256(np.full((HORIZONS.prediction_horizon, 10), np.nan))
+OF_HALVES = actions_sha256(np.full((HORIZONS.prediction_horizon, 10), 0.5))
 
 
 @pytest.fixture(scope="module")
@@ -259,15 +264,48 @@ class Rounds:
         return SimpleNamespace(actions=np.full(shape, 0.5 + 1e-6))
 
 
+def asked(*, numbered, hashed):
+    """One candidate with its numbers, where it has some, and one of which only a hash is left."""
+    source = Source(("stress", "nominal", 0, 1), np.zeros((2, 24)))
+    told = [Asked("two", source, 1, None, hashed)]
+    return [Asked("one", source, 0, np.full((16, 10), 0.5)), *told] if numbered else told
+
+
+def drawn(items, policy):
+    rule = Rule(REPLACING, HORIZONS.prediction_horizon)
+    return draw_again("D", policy, items, count=2, rule=rule)
+
+
 @pytest.mark.parametrize(("sha256", "refused"), [("0" * 64, False), (NOTHING, True)])
 def test_that_nothing_was_drawn_is_told_by_a_hash_whatever_a_processor_rounds(sha256, refused):
     """Of numbers a hash says nothing there; that there are none it says everywhere."""
-    source = module.Source(("stress", "nominal", 0, 1), np.zeros((2, 24)))
-    numbered = module.Asked("one", source, 0, np.full((16, 10), 0.5))
-    hashed = module.Asked("two", source, 1, None, sha256)
-    rule = module.Rule(module.REPLACING, HORIZONS.prediction_horizon)
+    items = asked(numbered=True, hashed=sha256)
     if refused:
         with pytest.raises(RefusedError, match="two is NaN throughout"):
-            module._compare("D", Rounds(), [numbered, hashed], count=2, rule=rule)
+            drawn(items, Rounds())
     else:
-        module._compare("D", Rounds(), [numbered, hashed], count=2, rule=rule)
+        hold_hashes({"flow": drawn(items, Rounds())}, networks=["flow"])
+
+
+class Exact(Rounds):
+    """A policy on the processor that the evidence comes from."""
+
+    def sample(self, observations, *, candidates, **_):
+        shape = (len(observations), candidates, HORIZONS.prediction_horizon, 10)
+        return SimpleNamespace(actions=np.full(shape, 0.5))
+
+
+@pytest.mark.parametrize("other", ["flow", "planner", None])
+def test_who_has_no_numbers_is_held_to_its_hashes_where_the_others_come_again_to_the_bit(other):
+    """On another processor every chunk of who was always refused stood for an invented one."""
+    refused = asked(numbered=False, hashed="0" * 64)
+    networks = [name for name in ("bc", other) if name not in ("planner", None)]
+    for beside, held in ((Exact(), True), (Rounds(), other != "flow")):
+        found = {"bc": drawn(refused, beside)}
+        if other:
+            found[other] = drawn(asked(numbered=True, hashed=OF_HALVES), beside)
+        if held:
+            with pytest.raises(RefusedError, match="two is drawn as 0000000000000000"):
+                hold_hashes(found, networks=networks)
+        else:
+            hold_hashes(found, networks=networks)
