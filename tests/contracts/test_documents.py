@@ -189,3 +189,11 @@ def test_what_is_linked_is_there(name) -> None:
     path = ROOT / name
     for target in re.findall(r"\]\(([^)#:]+)\)", path.read_text()):
         assert (path.parent / target).exists(), target
+
+
+def test_a_decision_stands_under_its_number_once():
+    """Others name it by that number; a merge once kept an older wording beside the newer one."""
+    text = (DOCS / "decisions.md").read_text()
+    numbers = re.findall(r"^\*\*(\d+)\.", text, re.MULTILINE)
+    assert len(numbers) > 300
+    assert sorted({n for n in numbers if numbers.count(n) > 1}) == []
