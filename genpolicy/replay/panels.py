@@ -41,8 +41,8 @@ STATES = (
     ("recovery", "/journal/recovery.new"),
 )
 DISTANCE_M, BESIDE_DEG = 1.6, 135
-"""From the eye to the middle of the workspace, and how far it stands round: in front of the arm,
-which else hides what it does."""
+"""From the eye to the middle of the workspace, and how far it stands round: facing the arm, which
+else hides what it does."""
 FRAMES = {"showLabel": False, "axisScale": 0.1}
 """How frames are drawn: as a viewer has it by itself, an arrow is 1 m long and its name hides the
 cell."""

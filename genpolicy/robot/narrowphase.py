@@ -33,8 +33,8 @@ class NarrowPhase:
         ]
         self._inflated: dict[tuple[int, int], Any] = {}
         self._plain = [fcl.CollisionObject(fcl_geometry(s, inflation_m=0.0)) for s in shapes.scene]
-        self._standing: SceneState | None = None
-        self._stands: set[int] = set()
+        self._scene: SceneState | None = None
+        self._placed: set[int] = set()
 
     def test(
         self,
@@ -96,11 +96,11 @@ class NarrowPhase:
 
     def _scene_object(self, scene: SceneState, shape: int) -> Any:
         """FCL object of a scene shape where it stands; placed once for as long as one is asked."""
-        if scene is not self._standing:
-            self._standing, self._stands = scene, set()
-        if shape not in self._stands:
+        if scene is not self._scene:
+            self._scene, self._placed = scene, set()
+        if shape not in self._placed:
             place(self._plain[shape], *self.scene_placement(scene, shape))
-            self._stands.add(shape)
+            self._placed.add(shape)
         return self._plain[shape]
 
     def _object(self, shape: int, inflation_m: float) -> Any:

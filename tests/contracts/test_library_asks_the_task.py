@@ -44,6 +44,7 @@ LOCAL = {
     ("genpolicy/audit/learned.py", "right"): "the same",
     ("genpolicy/pages/audit/pictures.py", "left"): "matplotlib: where a title stands",
     ("genpolicy/pages/figures/drawing.py", "left"): "the same",
+    ("genpolicy/replay/panels.py", "left"): "Foxglove: on which side of a plot its legend stands",
     ("genpolicy/data/formats/consequences.py", "left"): "one of two arms, in a recorder's name",
     ("genpolicy/data/formats/consequences.py", "right"): "the same",
     ("genpolicy/execution/cell.py", "retreat"): "a primitive of recovery, not a phase",
