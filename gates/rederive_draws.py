@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gates.rederive_again import Again, Asked, draw_again, hold_hashes
 from gates.rederive_brought import brought_policy
@@ -41,7 +40,6 @@ from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.drawn import Drawn, Source, drawn_chunks
 from genpolicy.verification.journal_source import readable
 
-Array = NDArray[np.float64]
 OF_A_JOURNAL = 12
 """Candidates of a journal of Gate D that are drawn again."""
 OF_A_METHOD = 48
