@@ -22,7 +22,7 @@ from pathlib import Path
 from flows.estimate import estimate
 from flows.judged import GOES_ON, judged, last_gate
 from genpolicy.cli.shell import INTERRUPTED, run_program
-from genpolicy.errors import BadInputError, GenpolicyError
+from genpolicy.errors import DEAD_WORKER, BadInputError, GenpolicyError
 from genpolicy.outputs import require_own_files
 
 EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
@@ -41,7 +41,7 @@ INFRASTRUCTURE = re.compile(
 )
 # The exception with which a stage ends when a process that it fanned out to died under it: that of
 # the local pool, and that of a cluster after its own tries.
-DEAD_WORKER = re.compile(r"^(?:\w+\.)*(?:BrokenProcessPool|KilledWorker)\b")
+WORKER_DIED = re.compile(rf"^(?:\w+\.)*(?:{'|'.join(DEAD_WORKER)})\b")
 DIED = (
     "a worker process died under the stage, as one does that is killed where memory runs out. "
     "Nothing half written was left, and the stage begins anew. If one dies again, lower "
@@ -273,7 +273,7 @@ def _worker_died(stage: str, lines: Sequence[str]) -> bool:
     """
     own = [place for place, line in enumerate(lines) if line.startswith(f"{stage}: ")]
     before = [line for line in lines[: own[-1]] if line] if own else []
-    return bool(before) and DEAD_WORKER.match(before[-1]) is not None
+    return bool(before) and WORKER_DIED.match(before[-1]) is not None
 
 
 if __name__ == "__main__":

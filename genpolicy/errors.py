@@ -6,6 +6,10 @@ bad input, 3 refused by a gate.
 
 from typing import ClassVar
 
+DEAD_WORKER = ("BrokenProcessPool", "KilledWorker")
+"""By name, the errors of a local pool and of a cluster of which a process was killed: nobody here
+knows the module of the second before there is a cluster."""
+
 
 class GenpolicyError(Exception):
     """Root of every error that the project raises on purpose."""

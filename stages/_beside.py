@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from genpolicy.errors import GenpolicyError
 from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
-from stages._stage import TIMES, Params, _record, _taken, load_params
+from stages._stage import TIMES, Params, _record, _taken, load_params, unexpected
 
 
 def main(name: str, work: Callable[[Params], None], *, writes: bool = True) -> NoReturn:
@@ -39,12 +39,9 @@ def main(name: str, work: Callable[[Params], None], *, writes: bool = True) -> N
     except GenpolicyError as error:
         print(f"{name}: {error}", file=sys.stderr)
         code = error.exit_code
-    except Exception:
+    except Exception as error:
         traceback.print_exc()
-        print(
-            f"{name}: this is a fault of genpolicy, not of your input. Report the lines above.",
-            file=sys.stderr,
-        )
+        print(f"{name}: {unexpected(error)}", file=sys.stderr)
         code = 1
     if writes:
         _record(name, started, code)

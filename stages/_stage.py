@@ -21,7 +21,7 @@ from pydantic import BaseModel, Field
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings, parse_settings
-from genpolicy.errors import ConfigError, GenpolicyError
+from genpolicy.errors import DEAD_WORKER, ConfigError, GenpolicyError
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
 
@@ -32,8 +32,6 @@ ARTIFACTS = Path("artifacts")
 TIMES = Path("build/times")
 SILENT = ("latency", "wall_clock")
 """Stages that measure time: nothing else runs in their process meanwhile."""
-DEAD_WORKER = ("BrokenProcessPool", "KilledWorker")
-"""By name: of a cluster's error nobody here knows the module before there is a cluster."""
 KILLED = (
     "a process that worked for this stage was killed: by the machine, for memory, or by somebody. "
     "Nothing is half-written; run it again, with fewer `compute.workers` if memory was short."
@@ -153,12 +151,16 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         sys.exit(error.exit_code)
     except Exception as error:
         traceback.print_exc()
-        why = KILLED if type(error).__name__ in DEAD_WORKER else OURS
-        print(f"{name}: {why}", file=sys.stderr)
+        print(f"{name}: {unexpected(error)}", file=sys.stderr)
         _record(name, started, 1)
         sys.exit(1)
     _record(name, started, 0)
     sys.exit(0)
+
+
+def unexpected(error: Exception) -> str:
+    """What a stage says behind the traceback of an error that nobody raised on purpose."""
+    return KILLED if type(error).__name__ in DEAD_WORKER else OURS
 
 
 def _taken(name: str) -> float | None:

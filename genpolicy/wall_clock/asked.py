@@ -3,10 +3,6 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.feasibility.admission import Admitted
 
@@ -20,7 +16,6 @@ class Asked:
         row: Row of the replay that it was asked at.
         asked_s: When, s.
         answered_s: When the answer came, s; None before.
-        actions: What was answered, shape (K, 10).
         admitted: The chunk, where it passed; it is delivered when its first row is the next.
         first_row: Row of the replay that its first checked action is for.
     """
@@ -29,7 +24,6 @@ class Asked:
     row: int
     asked_s: float
     answered_s: float | None = None
-    actions: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, ACTION_DIM)))
     admitted: Admitted | None = None
     first_row: int = 0
 

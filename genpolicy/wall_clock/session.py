@@ -16,7 +16,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from genpolicy.candidates.selector import propose
-from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason
+from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import Session
 from genpolicy.execution.cell import Cell
@@ -171,7 +171,7 @@ class SupervisedSession:
         if answer.invocation != asked.metadata.chunk_id:
             self.tally.dropped["unsolicited"] += 1
             return
-        asked.answered_s, asked.actions = now_s, answer.actions
+        asked.answered_s = now_s
         asked.metadata = replace(
             asked.metadata, policy_checkpoint_hash=answer.checkpoint,
             sampler_config_hash=answer.sampler, method=answer.method,
@@ -180,9 +180,12 @@ class SupervisedSession:
         if self._next_row(now_s, 0.0) > self._last_row(asked):
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
-        self._look(asked, now_s, submit, judging_s=judging_s)
+        proposal = propose([Candidate(asked.metadata, answer.actions)])
+        self._look(asked, proposal, now_s, submit, judging_s=judging_s)
 
-    def _look(self, asked: Asked, now_s: float, submit: Submit, *, judging_s: float) -> None:
+    def _look(
+        self, asked: Asked, proposal: Proposal, now_s: float, submit: Submit, *, judging_s: float
+    ) -> None:
         """Have an answer judged for the first row that its verdict can be in time for."""
         # One verdict that took too long must not keep all that follow from being judged.
         asked.first_row = min(self._next_row(now_s, judging_s), self._last_row(asked))
@@ -190,7 +193,7 @@ class SupervisedSession:
         row, seen_s = self._seen if self.arm.follows else (asked.row, asked.asked_s)
         taken = submit(
             Job(
-                proposal=propose([Candidate(asked.metadata, asked.actions)]),
+                proposal=proposal,
                 history=self.arm.history(row, min(row + 1, 2), scene=asked.row),
                 commanded=self.arm.commanded(asked.row, asked.first_row),
                 session=self._in_force(),
@@ -228,7 +231,7 @@ class SupervisedSession:
         missed = isinstance(result, Admitted) and asked.first_row <= self._row
         if missed and self._next_row(now_s, 0.0) <= self._last_row(asked):
             self.tally.again += 1
-            self._look(asked, now_s, submit, judging_s=judging_s)
+            self._look(asked, job.proposal, now_s, submit, judging_s=judging_s)
             return
         if result is not None:
             verdict = result.verdict
