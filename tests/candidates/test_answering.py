@@ -95,5 +95,5 @@ def test_whoever_opens_a_trained_policy_is_never_ended_by_its_cap(fleet, data, k
         seen = fixture_observations(data, horizons=kit.HORIZONS, count=1)
         drawn = own.sample(seen, noise_names=names([0]), candidates=3)
         assert np.isnan(drawn.actions).all() and drawn.nfe <= 10
-        spans = invoke(own, seen, repeat=0, candidates=3, project=None)
+        spans = invoke(own, seen, repeat=0, candidates=3)
         assert own.given_up == 2 and spans["sample"] > 0.0

@@ -194,16 +194,15 @@ def invoke(
     *,
     repeat: int,
     candidates: int,
-    project: Projection | None,
     joining: JoiningSettings = REPLACING,
 ) -> dict[str, float]:
-    """What the terms of one invocation took, s; by a rule that joins, behind a plan before it.
+    """What the terms of an invocation took up to its selection, s; behind a plan, if it joins.
 
     That plan speaks for all that it may; what it is takes no time here, and would have been drawn
     by the invocation before.
     """
     asked = _Asked(row, 0, repeat, candidates)
-    spans = _spans(SpanClock(), policy, asked, project, joining)
+    spans = _spans(SpanClock(), policy, asked, None, joining)
     return {name: span.seconds for name, span in spans.items()}
 
 

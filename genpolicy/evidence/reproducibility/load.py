@@ -90,8 +90,7 @@ def _measured(
     for count in COUNTS:
         for repeat in range(-DISCARDED, REPEATS):
             row = seen[repeat % len(seen)][None]
-            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None,
-                           joining=joining)  # fmt: skip
+            spans = invoke(policy, row, repeat=repeat, candidates=count, joining=joining)
             if repeat >= 0:
                 rows.append(
                     CandidatesRow(

@@ -199,7 +199,7 @@ def _in_turns(
         for policy in policies:
             count = candidates_of(policy, plan.samples)
             before = _faults(policy)
-            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None)
+            spans = invoke(policy, row, repeat=repeat, candidates=count)
             if repeat >= 0 and _faults(policy) == before:
                 rows.append(
                     SweepLatencyRow(

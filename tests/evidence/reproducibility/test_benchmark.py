@@ -136,9 +136,7 @@ def test_what_a_server_takes_to_select_is_added_to_what_it_takes_here(
         remote = RemotePolicy(entry, address, task.observation)
         brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
         policy = WirePolicy(brought, remote)
-        terms = invoke(
-            policy, np.zeros((1, 2, task.observation.dim)), repeat=0, candidates=1, project=None
-        )
+        terms = invoke(policy, np.zeros((1, 2, task.observation.dim)), repeat=0, candidates=1)
         remote.close()
     assert set(terms) == {"preprocess", "encode", "sample", "select"}
     assert terms["select"] > 1.0
