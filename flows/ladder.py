@@ -17,10 +17,11 @@ from prefect import Flow, State, flow
 from prefect.runtime import deployment
 from prefect.states import Completed, Failed
 
+from flows.beforehand import refused_beforehand
 from flows.card_gate import WAITS, hand_over, start_by_hand, told
 from flows.estimate import estimate
 from flows.gate_runs import run_gate
-from flows.reproduce import EXIT_FAULT, stop_all
+from flows.reproduce import EXIT_BAD_INPUT, EXIT_FAULT, stop_all
 from flows.server import api_url, server_is_there, watch_server
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import ConfigError
@@ -101,6 +102,9 @@ def run_ladder(workspace: Path) -> int:
             expected=f"only {', '.join(GATES)}",
             action="Correct the names of the stages.",
         )
+    if why := refused_beforehand(workspace):
+        print(f"The ladder stopped: {why}", file=sys.stderr)
+        return EXIT_BAD_INPUT
     print(estimate(workspace), flush=True)
     folder = str(workspace.resolve())
     try:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from flows.beforehand import refused_beforehand
 from flows.estimate import estimate
 from flows.judged import GOES_ON, judged, last_gate
 from genpolicy.cli.shell import INTERRUPTED, run_program
@@ -110,6 +111,8 @@ def reproduce(
         require_own_files(workspace)  # DVC would remove the others without a word
     except GenpolicyError as error:
         return RunEnd(error.exit_code, "", str(error), infrastructure=False, duration_s=0.0)
+    if not stages and (why := refused_beforehand(workspace)):
+        return RunEnd(EXIT_BAD_INPUT, "", why, infrastructure=False, duration_s=0.0)
     lines: deque[str] = deque(maxlen=KEPT_LINES)
     process = subprocess.Popen(
         command,
