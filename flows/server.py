@@ -30,6 +30,7 @@ class watch_server:  # noqa: N801  (used like a function, as a context)
         period_s: Time between two questions.
         answers: Asks the server; a parameter for tests.
         give_up: Called once when the server is given up; a parameter for tests.
+        clock: Says how late it is, s; a parameter for tests.
     """
 
     def __init__(
@@ -40,12 +41,14 @@ class watch_server:  # noqa: N801  (used like a function, as a context)
         period_s: float = PROBE_PERIOD_S,
         answers: Callable[[str], bool] | None = None,
         give_up: Callable[[str], None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url = url
         self._silence_s = silence_s
         self._period_s = period_s
         self._answers = answers or server_answers
         self._give_up = give_up or _leave
+        self._clock = clock
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="server watch", daemon=True)
 
@@ -57,11 +60,11 @@ class watch_server:  # noqa: N801  (used like a function, as a context)
         self._done.set()
 
     def _watch(self) -> None:
-        heard = time.monotonic()
+        heard = self._clock()
         while not self._done.wait(self._period_s):
             if self._answers(self._url):
-                heard = time.monotonic()
-            elif time.monotonic() - heard >= self._silence_s:
+                heard = self._clock()
+            elif self._clock() - heard >= self._silence_s:
                 self._give_up(self._url)
                 return
 

@@ -23,6 +23,7 @@ from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainin
 from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
+from gates.rederive_ingest import rederive_ingest
 from gates.rederive_latency import rederive_latency
 from gates.rederive_monitors import rederive_monitors
 from gates.rederive_outcomes import rederive_outcomes
@@ -113,10 +114,10 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, a push or a drill not what was
             planned, recorded commands lead elsewhere than they are said to, a chunk, a mode, a
-            fixture or a latent not what its checkpoint draws again, a row of the audit not what its
-            dataset gives again, or a power, a mutant, a statistic, a split or the cost of a
-            distillation is not what is computed again. Or a page or a file of rows says other than
-            the report.
+            fixture or a latent not what its checkpoint draws again, a row of the dataset not what
+            its recordings give, one of the audit not what the dataset gives again, or a power, a
+            mutant, a statistic, a split or the cost of a distillation is not what is computed
+            again. Or a page or a file of rows says other than the report.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -127,9 +128,10 @@ def rederive(root: Path, gate: Gate, *, printed: bool = True) -> None:
 
 def _evidence(root: Path, gate: Gate) -> None:
     """Everything that lies under a report of the gate."""
+    params = read_params(root)
     if gate == "A":
         rederive_dataset(root)
-    params = read_params(root)
+        rederive_ingest(root, params)
     if gate in TRAININGS:
         rederive_trainings(root, gate, params)
         if gate == "A":

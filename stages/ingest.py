@@ -7,30 +7,13 @@ Recordings come from the stage `record` or from a folder of one's own (`source`)
 import math
 import shutil
 
-import numpy as np
-
-from genpolicy.contract.settings import Settings
-from genpolicy.data.contract import TCP_ACTION, IngestContract, SplitRule, plausible_ranges
 from genpolicy.data.dataset import load_dataset
-from genpolicy.data.ingest import ingest_recordings
+from genpolicy.data.of_task import IngestSection, ingest_of_task
 from genpolicy.errors import ContractError
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.tasks.api import load_task
 from stages._contracts import require_contract_of_task
 from stages._source import SourceSection, require_unchanged
 from stages._stage import ARTIFACTS, Params, main
-
-
-class IngestSection(Settings):
-    """Section `ingest`.
-
-    Attributes:
-        train: Share of the training split.
-        validation: Share of the validation split; the rest is the test.
-    """
-
-    train: float
-    validation: float
 
 
 def work(params: Params) -> None:
@@ -39,30 +22,13 @@ def work(params: Params) -> None:
     if source.kind == "dataset":
         take_dataset(source, period_s=params.horizons.action_period_s)
         return
-    section = params.section("ingest", IngestSection)
     recorded = sorted((ARTIFACTS / "record" / "episodes").glob("*.mcap"))
-    task = load_task(params.task.name)
-    contract = IngestContract(
-        observation=task.observation,
-        phases=task.phases,
-        action_period_s=params.horizons.action_period_s,
-        joint_range_rad=(
-            tuple(task.limits.position_lower_rad.tolist()),
-            tuple(task.limits.position_upper_rad.tolist()),
-        ),
-        ranges=plausible_ranges(
-            task.observation,
-            TCP_ACTION,
-            workspace_lower_m=np.array(task.workspace.lower_m),
-            workspace_upper_m=np.array(task.workspace.upper_m),
-        ),
-    )
-    ingest_recordings(
+    ingest_of_task(
         recorded if source.kind == "embedded" else require_unchanged(source),
-        contract=contract,
-        out=ARTIFACTS / "ingest",
+        ARTIFACTS / "ingest",
         task=params.task.name,
-        split=SplitRule(train=section.train, validation=section.validation),
+        action_period_s=params.horizons.action_period_s,
+        section=params.section("ingest", IngestSection),
     )
 
 

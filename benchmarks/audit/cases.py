@@ -202,7 +202,7 @@ DATA = (
 LABELLED = (
     Cause(
         "wrong labels", "label_contamination", "share of labels", (0.02, 0.05, 0.1, 0.25), 0.1,
-        "one label in ten; the exact bound of 60 replays cannot tell less from the limit of 8 %",
+        "one label in ten; the exact bound of 60 replays cannot tell less from the limit of 10 %",
         lambda seed, s, task: replace(base(seed), wrong_labels=s),
         (LABELS,), (VALID, UNIMODAL, SUPPORT),
     ),

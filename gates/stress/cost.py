@@ -1,6 +1,7 @@
 """The cost: deadlines, latency, holds, rejections, fallback, people, stops, and force.
 
-Each must be within its limit in every planned condition. Where one rollout holds many trials
+Each must be within its limit in every planned condition; the share of the fallback not in the
+drill, which calls for it on every start. Where one rollout holds many trials
 (ticks, invocations), the starts are drawn again, whole; where it holds one, the bound is exact.
 """
 

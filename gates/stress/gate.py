@@ -123,7 +123,8 @@ GATE = GateSpec(
         CHECKPOINT_ONLY,
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
         AVERAGED,
-        "Every cost and every bound of success holds in each planned condition, not on average.",
+        "Every cost and every bound of success holds in each planned condition, not on average; "
+        "the share of the fallback not in the drill that calls for it.",
         "Only methods matched in data, encoder, horizons, resets and deadlines are compared, but "
         "for those that are named as unmatched.",
     ),

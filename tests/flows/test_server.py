@@ -1,35 +1,57 @@
 """The Prefect server: a silent one is given up, a slow one is not."""
 
 import threading
-import time
+from collections.abc import Iterator
 
 from flows import server
 
 
-def test_a_silent_server_is_given_up_once_and_a_slow_one_is_not() -> None:
-    given_up = threading.Event()
-    started = time.monotonic()
-    calls: list[str] = []
+class Asked:
+    """A server by a clock of its own: each question takes a while and has the next answer."""
 
-    def give_up(url: str) -> None:
-        calls.append(url)
-        given_up.set()
+    def __init__(self, answers: Iterator[bool], *, lasts_s: float, enough: int) -> None:
+        self.answers, self.lasts_s, self.enough = answers, lasts_s, enough
+        self.now_s, self.questions = 0.0, 0
+        self.given_up: list[float] = []
+        self.ended = threading.Event()
 
-    with server.watch_server(
-        "u", silence_s=0.3, period_s=0.02, answers=lambda _: False, give_up=give_up
-    ):
-        assert given_up.wait(10)
-        assert time.monotonic() - started >= 0.3
-        time.sleep(0.1)
-    assert calls == ["u"]
+    def answer(self, _: str) -> bool:
+        self.now_s += self.lasts_s
+        self.questions += 1
+        if self.questions >= self.enough:
+            self.ended.set()
+        return next(self.answers)
 
-    answers = iter([False, False, True] * 1000)
-    calls.clear()
-    with server.watch_server(
-        "u", silence_s=0.5, period_s=0.02, answers=lambda _: next(answers), give_up=calls.append
-    ):
-        time.sleep(1.0)
-    assert calls == []
+    def give_up(self, _: str) -> None:
+        self.given_up.append(self.now_s)
+        self.ended.set()
+
+    def watch(self, silence_s: float) -> None:
+        with server.watch_server(
+            "u", silence_s=silence_s, period_s=0.001, answers=self.answer, give_up=self.give_up,
+            clock=lambda: self.now_s,
+        ) as watch:  # fmt: skip
+            self.ended.wait()
+        watch._thread.join()
+
+
+def test_a_silent_server_is_given_up_once_and_not_before() -> None:
+    silent = Asked(iter(lambda: False, True), lasts_s=0.125, enough=1000)
+    silent.watch(silence_s=0.5)
+    assert silent.given_up == [0.5]
+    assert silent.questions == 4
+
+
+def test_a_slow_server_is_not_given_up() -> None:
+    slow = Asked(iter([False, False, False, True] * 100), lasts_s=0.125, enough=200)
+    slow.watch(silence_s=0.5)
+    assert slow.given_up == []
+
+
+def test_silence_counts_from_the_last_answer() -> None:
+    later = Asked(iter([False, False, False, True, *[False] * 9]), lasts_s=0.125, enough=1000)
+    later.watch(silence_s=0.5)
+    assert later.given_up == [1.0]
 
 
 def test_the_limits_on_silence_leave_a_minute_untouched() -> None:

@@ -15,6 +15,9 @@ from benchmarks.ladder_truth.planting import (
     table,
 )
 from benchmarks.ladder_truth.workspace import set_limit
+from genpolicy.data.assemble import MANIFEST_FILE, seal
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.hashing import sha256_file
 
 RESTORED = (
     "At first DVC, to which a copy is new, hashed the file and restored it; now it has seen it."
@@ -55,6 +58,10 @@ def _never_valid(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(**{name: frame[name].mask(noisy, 0) for name in columns})
 
 
+def _only_successes_recorded(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.assign(outcome="success")
+
+
 def _explained_by_nothing(frame: pd.DataFrame) -> pd.DataFrame:
     tests = {"p_value": 1.0, "p_adjusted": 1.0}
     return frame.assign(**tests, effect=0.0, effect_lower=0.0, effect_upper=0.05)
@@ -72,6 +79,14 @@ def _in_the_modes(frame: pd.DataFrame) -> pd.DataFrame:
         modes_valid=frame["modes_valid"].mask(flow, frame["modes_present"]),
         fewest_admissible=frame["fewest_admissible"].mask(flow, each),
     )
+
+
+def _sealed_again(workspace: Path) -> None:
+    """The manifest names the tables as they lie there now, as ingest would have written it."""
+    folder = workspace / "artifacts/ingest"
+    manifest = read_json(folder / MANIFEST_FILE)
+    files = {name: sha256_file(folder / name) for name in manifest["files"]}
+    (folder / MANIFEST_FILE).write_bytes(seal({**manifest, "files": files}))
 
 
 def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:
@@ -139,6 +154,13 @@ WRONGS = (
           all_of(table("artifacts/measure_baselines/modes.parquet", _never_valid),
                  committed("measure_baselines")),
           Expected("A", (), refusal=r"bc_noise \(seed 0\)")),
+    Wrong("the_dataset_is_forged", "evidence",
+          "Every failure counts as a success in the dataset, which is sealed and committed.",
+          "brought",
+          all_of(table("artifacts/ingest/episodes.parquet", _only_successes_recorded),
+                 _sealed_again, committed("ingest")),
+          Expected("A", (), refusal=r"artifacts/ingest/episodes\.parquet: outcome of row"),
+          note="Named with the check that derives the dataset from its recordings again."),
     Wrong("the_audit_is_forged", "evidence",
           "No variable explains the modes, by the audit's table, and that is committed.",
           "small",

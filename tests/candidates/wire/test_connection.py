@@ -33,8 +33,8 @@ def raw():
         thread.join(5)
 
 
-def asked(address, message=None, timeout_s=2.0):
-    line = dial(address, allowed=None, timeout_s=2.0)
+def asked(address, message=None, timeout_s=60.0):
+    line = dial(address, allowed=None, timeout_s=60.0)
     try:
         return line.ask(message or {"o": np.arange(3.0)}, timeout_s=timeout_s)
     finally:
@@ -49,10 +49,10 @@ def fault_of(address, **arguments):
 
 def test_metadata_come_first_and_then_an_answer_to_each_message(serving):
     with serving(lambda message: {"twice": message["o"] * 2}, HELLO) as address:
-        line = dial(address, allowed=None, timeout_s=2.0)
+        line = dial(address, allowed=None, timeout_s=60.0)
         assert line.metadata == HELLO
         for number in range(3):
-            answer = line.ask({"o": np.full(2, number)}, timeout_s=2.0)
+            answer = line.ask({"o": np.full(2, number)}, timeout_s=60.0)
             assert answer["twice"].tolist() == [2 * number] * 2
         line.close()
 
@@ -96,7 +96,7 @@ def test_no_answer_in_time_is_late_and_what_comes_then_answers_nothing(serving):
         return dict(message)
 
     with serving(answer, HELLO) as address:
-        line = dial(address, allowed=None, timeout_s=2.0)
+        line = dial(address, allowed=None, timeout_s=60.0)
         with pytest.raises(PolicyError) as error:
             line.ask({"slow": 1}, timeout_s=0.05)
         assert error.value.fault is Fault.LATE
@@ -116,11 +116,11 @@ def test_a_server_that_answers_twice_is_at_fault(raw):
             line.send(pack({}))
             line.send(pack({}))
 
-    line = dial(raw(talk), allowed=None, timeout_s=2.0)
+    line = dial(raw(talk), allowed=None, timeout_s=60.0)
     faults = []
     for _ in range(50):
         try:
-            line.ask({}, timeout_s=2.0)
+            line.ask({}, timeout_s=60.0)
         except PolicyError as error:
             faults.append(error.fault)
             break
@@ -175,7 +175,7 @@ def test_a_server_that_does_not_read_does_not_hold_us(raw):
         line.send(pack(HELLO))
         end.wait()  # nothing is taken out of its queue, which fills, and then the line
 
-    line = dial(raw(talk), allowed=None, timeout_s=2.0)
+    line = dial(raw(talk), allowed=None, timeout_s=60.0)
     large = {"picture": np.zeros(MAXIMUM_MESSAGE_BYTES // 2, dtype=np.uint8)}
     faults = set()
     for _ in range(60):

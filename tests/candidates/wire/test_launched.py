@@ -49,7 +49,7 @@ def alive(pid):
 
 
 def metadata(address):
-    line = dial(address, allowed=None, timeout_s=5.0)
+    line = dial(address, allowed=None, timeout_s=60.0)
     line.close()
     return line.metadata
 

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 from planted import VALID, component, counts, named
 
+from gates.cause.numbers import Labels
+
 ONE_ACTION = counts(two_mode_episodes=0, two_mode=0, persistent=0)
 
 
@@ -49,10 +51,8 @@ def test_where_was_looked_is_said_beside_every_cause_that_speaks_of_modes():
         [said] = named(numbers).beside
         assert said == f"{looked}, of each component by itself."
     assert named(replace(VALID, components=())).beside == ()
-    defect = (
-        replace(VALID, label_disagreement=0.5) if hasattr(VALID, "label_disagreement") else None
-    )
-    assert defect is None or named(defect).beside == ()
+    defect = named(replace(VALID, labels=Labels(60, 12)))
+    assert defect.name == "label_contamination" and defect.beside == ()
 
 
 def test_every_component_stands_among_the_answers():
