@@ -107,12 +107,8 @@ def reproduce(
     command += ["--single-item"] if single_item else []
     command += ["--force"] if force else []
     started = time.monotonic()
-    try:
-        require_own_files(workspace)  # DVC would remove the others without a word
-    except GenpolicyError as error:
-        return RunEnd(error.exit_code, "", str(error), infrastructure=False, duration_s=0.0)
-    if not stages and (why := refused_beforehand(workspace)):
-        return RunEnd(EXIT_BAD_INPUT, "", why, infrastructure=False, duration_s=0.0)
+    if refused := _refused(workspace, stages):
+        return refused
     lines: deque[str] = deque(maxlen=KEPT_LINES)
     process = subprocess.Popen(
         command,
@@ -142,6 +138,17 @@ def reproduce(
         _print_first_page(workspace)
         return _of_the_last_gate(workspace, duration_s)
     return _outcome(code, list(lines), duration_s)
+
+
+def _refused(workspace: Path, stages: Sequence[str]) -> RunEnd | None:
+    """Why DVC is not started; None where it is."""
+    try:
+        require_own_files(workspace)  # DVC would remove the others without a word
+    except GenpolicyError as error:
+        return RunEnd(error.exit_code, "", str(error), infrastructure=False, duration_s=0.0)
+    if not stages and (why := refused_beforehand(workspace)):
+        return RunEnd(EXIT_BAD_INPUT, "", why, infrastructure=False, duration_s=0.0)
+    return None
 
 
 def _print_first_page(workspace: Path) -> None:

@@ -124,8 +124,13 @@ def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], 
     most = clopper_pearson(touched, rows["episode"].nunique(), settings.confidence)[1]
     if not few or not most <= ODD_SHARE:
         return [], ""
-    named = ", ".join(f"{mode} in {len(own)}" for mode, own in few.items())
-    return list(few), f"; left out: {named} episodes, together at most {percent(most)} of all"
+    parts = {mode: rows[rows["mode"] == mode]["admissible"] for mode in few}
+    named = ", ".join(
+        f"{mode} in {len(few[mode])} episodes "
+        f"({int(part.sum()) or 'none'} of {len(part)} candidates admissible)"
+        for mode, part in parts.items()
+    )
+    return list(few), f"; left out: {named}, together at most {percent(most)} of all"
 
 
 @criterion(

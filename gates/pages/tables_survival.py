@@ -20,8 +20,12 @@ WAYS = "_on_the_way"
 
 
 def _survival(evidence: Evidence, report: GateReport) -> Table:
-    """Of each method, fixture and mode the share that all six layers pass."""
+    """Of each method, fixture and mode the share that all six layers pass.
+
+    Of fewer episodes than the gate compares modes with, the share is said to be of too few.
+    """
     frame, lines = evidence.rows(CANDIDATES, CandidateRow), []
+    enough = int(report.settings["mode_observations"])
     confidence = float(report.settings["confidence"])
     for method in in_order(frame["method"]):
         for fixture in INTACT:
@@ -31,10 +35,11 @@ def _survival(evidence: Evidence, report: GateReport) -> Table:
                 share, *interval = share_interval(
                     passed, episodes.to_numpy(), confidence=confidence, favourable=True
                 )
+                few = f", fewer than the {enough} needed" if episodes.nunique() < enough else ""
                 lines.append(
                     (method, said(fixture), said(str(mode)) or "unassigned",
                      f"{passed.sum():g} of {len(rows)}", share_between(share, *interval),
-                     str(episodes.nunique()))
+                     f"{episodes.nunique()}{few}")
                 )  # fmt: skip
     return ("method", "observations", "mode", "admitted", "share, interval", "episodes"), *lines
 

@@ -115,6 +115,11 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
         f"{percent(promote)} of simulated trials; a gain of at most the margin is returned in "
         f"{percent(back)}"
     )
+    if len(settings.baselines) > 1:
+        text += (
+            f". That is over one simple method; over all {len(settings.baselines)}, each as good, "
+            "it is found less often: see `genpolicy plan`"
+        )
     limit = settings.limits.of.get("verdict_reachable")
     asked = limit.limit if limit and limit.limit is not None else 0.0
     # Rounded as it is judged: whatever fails by the return share is never called too small.

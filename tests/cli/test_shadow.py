@@ -119,3 +119,18 @@ def test_an_interrupt_stops_and_ends(monkeypatch):
     assert running.said == [
         (Order.EMERGENCY_STOP, "interrupt at the terminal"), (Order.END, ""),
     ]  # fmt: skip
+
+
+def test_a_broken_rule_of_the_checker_is_told_and_is_a_fault_of_ours(
+    root, tmp_path, monkeypatch, capsys
+):
+    nothing_typed, writer = os.pipe()
+    os.close(writer)
+    monkeypatch.setattr("sys.stdin", os.fdopen(nothing_typed))
+    broken = SimpleNamespace(rule="P1.age", text="Too old.")
+    monkeypatch.setattr(
+        "genpolicy.cli.shadow._checked", lambda *_: SimpleNamespace(violations=[broken])
+    )
+    assert run_shadow(ShadowOptions(root, tmp_path / "run", "flow"), ["flow"]) == 1
+    said = capsys.readouterr().out
+    assert "independent checker: 1 broken rules\n  P1.age: Too old." in said

@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from genpolicy.data.dataset import load_dataset
+from genpolicy.data.of_task import IngestSection
 from genpolicy.evidence.reproducibility.swept import SweepSection
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.execution.cell import ExecutionSettings
@@ -54,7 +55,7 @@ def test_params(monkeypatch, fallen_over):
     models = section_models() | {
         "execution": ExecutionSettings, "feasibility": FeasibilitySettings,
         "policy": PolicySettings, "reload": SweepSection, "source": SourceSection,
-        "shadow": ShadowSection,
+        "shadow": ShadowSection, "ingest": IngestSection,
     }  # fmt: skip
     assert len(models) > 8
 

@@ -309,12 +309,13 @@ def test_another_seed_or_confidence_than_that_of_the_workspace_is_refused(audite
 def test_gate_a_asks_it_before_modes_are_counted_where_it_says(repo, monkeypatch):
     asked = []
     monkeypatch.setattr(rederive, "rederive_trainings", lambda *_: None)
+    monkeypatch.setattr(rederive, "rederive_ingest", lambda *_: asked.append("recordings"))
     monkeypatch.setattr(rederive, "rederive_policies", lambda *_: asked.append("modes"))
     monkeypatch.setattr(rederive, "rederive_audit", lambda *_: asked.append("audit"))
     rung = Rung("A", "need", "PASS", "", "", "reports/gate_a.json", 0)
     assert rederive.rederived(repo, [rung]) == [rung]
-    assert asked == ["audit", "modes"]
+    assert asked == ["recordings", "audit", "modes"]
     for name in ("rederive_brought", "rederive_conformance", "rederive_costs"):
         monkeypatch.setattr(rederive, name, lambda *_: None)
     rederive.rederived(repo, [Rung("B", "r", "PASS", "", "", "reports/gate_b.json", 0)])
-    assert asked == ["audit", "modes", "modes"]
+    assert asked == ["recordings", "audit", "modes", "modes"]

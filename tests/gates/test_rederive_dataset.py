@@ -91,7 +91,11 @@ def test_rows_of_unequal_length_are_refused(dataset, least):
 
 
 def test_gate_a_is_refused_where_its_dataset_is(dataset, monkeypatch):
-    for name in ("rederive_audit", "rederive_policies"):  # nothing was recorded or trained here
+    for name in (
+        "rederive_ingest",
+        "rederive_audit",
+        "rederive_policies",
+    ):  # nothing was recorded or trained here
         monkeypatch.setattr(rederive, name, lambda *_: None)
     rung = Rung("A", "need", "PASS", "", "", "reports/gate_a.json", 0)
     assert rederived(dataset, [rung])[0].verdict == "PASS"
@@ -116,7 +120,8 @@ def _training(root, folder, **changes):
     ("gate", "folder"),
     [("A", "train_baselines"), ("A", "train_factors"), ("B", "train_generators")],
 )
-def test_a_training_that_saw_another_split_is_refused(dataset, gate, folder):
+def test_a_training_that_saw_another_split_is_refused(dataset, gate, folder, monkeypatch):
+    monkeypatch.setattr(rederive, "rederive_ingest", lambda *_: None)  # nothing was recorded here
     _training(dataset, folder)
     rederive_trainings(dataset, gate, evidence.PARAMS)
     own = _training(dataset, folder, episodes="validation")

@@ -58,8 +58,8 @@ def _never_valid(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(**{name: frame[name].mask(noisy, 0) for name in columns})
 
 
-def _only_successes_recorded(frame: pd.DataFrame) -> pd.DataFrame:
-    return frame.assign(outcome="success")
+def _other_operators(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.assign(operator=frame["operator"].to_numpy()[::-1])
 
 
 def _explained_by_nothing(frame: pd.DataFrame) -> pd.DataFrame:
@@ -155,11 +155,11 @@ WRONGS = (
                  committed("measure_baselines")),
           Expected("A", (), refusal=r"bc_noise \(seed 0\)")),
     Wrong("the_dataset_is_forged", "evidence",
-          "Every failure counts as a success in the dataset, which is sealed and committed.",
+          "Who demonstrated is mixed up in the dataset, which is sealed and committed.",
           "brought",
-          all_of(table("artifacts/ingest/episodes.parquet", _only_successes_recorded),
+          all_of(table("artifacts/ingest/episodes.parquet", _other_operators),
                  _sealed_again, committed("ingest")),
-          Expected("A", (), refusal=r"artifacts/ingest/episodes\.parquet: outcome of row"),
+          Expected("A", (), refusal=r"artifacts/ingest/episodes\.parquet: operator of row"),
           note="Named with the check that derives the dataset from its recordings again."),
     Wrong("the_audit_is_forged", "evidence",
           "No variable explains the modes, by the audit's table, and that is committed.",

@@ -161,14 +161,25 @@ def _takes_another_way(name, observations):
     return change
 
 
+def _refused(mode):
+    return lambda frame: frame.assign(
+        dynamic=frame["dynamic"].mask(frame["mode"] == mode, False),
+        outcome=frame["outcome"].mask(frame["mode"] == mode, "failed"),
+        first_reason=frame["first_reason"].mask(frame["mode"] == mode, "joint_jerk"),
+    )
+
+
 def test_one_odd_chunk_does_not_keep_the_gate_open(ladder):
     """A mode label of one chunk stood for a mode with too few observations to be compared."""
     number = _two_modes(ladder)[0]
     evidence.edit_table(ladder, CANDIDATES, _takes_another_way("over", [number]))
     report, found = _gap(ladder)
     assert found.verdict == report.verdict == "PASS"
-    assert found.caveat.endswith("; left out: over in 1 episodes, together at most 8.94 % of all")
+    said = "; left out: over in 1 episodes ({} of 1 candidates admissible), together at most 8.94 %"
+    assert said.format(1) in found.caveat
     assert "over" not in found.caveat.partition(";")[0], "it is compared with nothing"
+    evidence.edit_table(ladder, CANDIDATES, _refused("over"))
+    assert said.format("none") in _gap(ladder)[1].caveat, "what the checks do to it is said"
 
 
 def _two_modes(ladder):

@@ -48,6 +48,19 @@ def test_a_mode_that_loses_half_shows_half_with_its_interval_over_episodes(copie
     assert own["left"]["share, interval"] == share_between(share, *ends)
 
 
+def test_a_mode_of_too_few_episodes_says_how_many_are_needed(copied, judged):
+    def rare(frame):
+        at = (frame["fixture"] == "held_out") & (frame["mode"] == "left")
+        seen = frame.loc[at, "observation"].unique()
+        return frame.assign(mode=frame["mode"].mask(at & ~frame["observation"].isin(seen[:29]), ""))
+
+    evidence.edit_table(copied, TABLE, rare)
+    lines, _ = shown(copied, judged)
+    told = {line["mode"]: line["episodes"] for line in lines if line["observations"] == "held out"}
+    assert told["left"] == "29, fewer than the 30 needed"
+    assert told["right"].isdigit() and int(told["right"]) >= 30
+
+
 def test_every_action_went_somewhere(whole, judged):
     _, lines = shown(whole, judged)
     for method in evidence.CANDIDATES:
