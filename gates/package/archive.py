@@ -87,7 +87,7 @@ def write_archive(
         ) from error
     finally:
         with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            temporary.unlink()
 
 
 def blob_name(sha256: str) -> str:

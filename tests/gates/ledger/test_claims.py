@@ -211,3 +211,40 @@ def test_each_claim_stands_below_its_own_kind_once():
         if line.startswith("  ") and line[2] != " ":
             found[line.split(" · ")[0].strip()] = kind
     assert found == {claim.id: claim.kind for claim in claims}
+
+
+TOLD = """\
+source_specific: 1
+  gain · a study
+    says: 46.9 % better
+    where: table 1
+    does not show: that another task, another robot or another policy gains by
+      as much, or at all
+abstract_only: 2
+  faster · an abstract
+    says: 46.9 % better
+    where: table 1
+    does not show: here
+  slower · a study
+    says: 46.9 % better
+    where: table 1
+    does not show: here"""
+
+
+def test_claims_are_told_by_kind_in_lines_of_a_terminal(tmp_path):
+    long = "that another task, another robot or another policy gains by as much, or at all"
+    entries = (
+        ENTRY | {"id": "faster", "kind": "abstract_only", "source": "an abstract"},
+        ENTRY | {"does_not_show": long},
+        ENTRY | {"id": "slower", "kind": "abstract_only"},
+    )
+    assert ledger_text(read_ledger(written(tmp_path, *entries)).claims) == TOLD
+    assert len(read_ledger(written(tmp_path, ENTRY)).claims) == 1
+
+
+def test_a_line_of_a_claim_is_as_wide_as_a_terminal(tmp_path):
+    """Of 80 signs one line, of 81 two."""
+    for signs, lines in ((80, 5), (81, 6)):
+        says = "x" * 30 + " " + "y" * (signs - 30 - 1 - len("    says: "))
+        own = read_ledger(written(tmp_path, ENTRY | {"claim": says})).claims
+        assert len(ledger_text(own).splitlines()) == lines

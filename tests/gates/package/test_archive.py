@@ -1,6 +1,8 @@
 """The archive: whole or nothing, and nothing is believed that is read from it."""
 
+import io
 import os
+import re
 import shutil
 import zipfile
 from types import SimpleNamespace
@@ -13,7 +15,7 @@ from gates.package.index import BundledFile, BundledGroup, BundleIndex
 from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes
 
-FILES = {"a/b.txt": b"one", "c": b"two", "d/e/f": b"one"}
+FILES = {"a/b.txt": b"one", "c": b"two", "d/e/f": b"one", "g": b"six"}
 STATEMENT = b'{"a":1}'
 
 
@@ -68,7 +70,8 @@ def test_programs_can_be_run_where_they_are_unpacked(tmp_path, root, index):
     write_archive(tmp_path / "x.zip", marked, {"statements/gate_a.json": STATEMENT}, root=root)
     folder = out(tmp_path)
     unpack(tmp_path / "x.zip", folder)
-    assert os.access(folder / "c", os.X_OK) and not os.access(folder / "a/b.txt", os.X_OK)
+    modes = {name: (folder / name).stat().st_mode & 0o777 for name in ("c", "a/b.txt")}
+    assert modes == {"c": 0o755, "a/b.txt": 0o644}
 
 
 @pytest.mark.parametrize("kind", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -77,6 +80,15 @@ def test_an_entry_packed_in_another_way_is_refused(tmp_path, written, kind):
         whole.writestr("more", b"x", kind)
     with pytest.raises(IntegrityError, match="packed in another way"):
         unpack(written, out(tmp_path))
+
+
+def test_an_entry_may_be_deflated_or_not(tmp_path, written, index):
+    name = blob_name(sha256_bytes(b"two"))
+    again(written, lambda entries: entries.pop(name))
+    with zipfile.ZipFile(written, "a") as whole:
+        whole.writestr(name, b"two", zipfile.ZIP_DEFLATED)
+        assert len({entry.compress_type for entry in whole.infolist()}) == 2
+    assert unpack(written, out(tmp_path))[0] == index
 
 
 @pytest.mark.parametrize("place", ["", "run"])
@@ -98,7 +110,7 @@ def test_equal_bytes_are_carried_once_and_the_same_run_gives_the_same_archive(
     tmp_path, written, root, index
 ):
     with zipfile.ZipFile(written) as whole:
-        assert sum(name.startswith("blobs/") for name in whole.namelist()) == 2
+        assert sum(name.startswith("blobs/") for name in whole.namelist()) == 3
     os.utime(root / "c", (1, 1))
     write_archive(tmp_path / "y.zip", index, {"statements/gate_a.json": STATEMENT}, root=root)
     assert (tmp_path / "y.zip").read_bytes() == written.read_bytes()
@@ -115,14 +127,15 @@ def test_a_file_that_changes_meanwhile_leaves_nothing_new(tmp_path, written, roo
 
 def test_a_place_that_cannot_be_written_is_told(tmp_path, root, index):
     (tmp_path / "file").write_text("")
-    with pytest.raises(BadInputError, match="not writable"):
+    with pytest.raises(BadInputError, match=r"is not writable \(File exists\), expected"):
         write_archive(tmp_path / "file" / "x.zip", index, {}, root=root)
 
 
 def test_every_changed_byte_of_a_file_is_seen(tmp_path, written):
     name = blob_name(sha256_bytes(b"two"))
     again(written, lambda entries: entries.update({name: b"twO"}))
-    with pytest.raises(IntegrityError, match="other bytes than its index says"):
+    said = f"c is other bytes than its index says, expected 3 bytes, {sha256_bytes(b'two')[:12]}…"
+    with pytest.raises(IntegrityError, match=re.escape(said)):
         unpack(written, out(tmp_path))
 
 
@@ -134,6 +147,22 @@ def test_no_more_is_unpacked_than_the_index_says(tmp_path, written, monkeypatch)
     with pytest.raises(IntegrityError, match="other bytes than its index says"):
         unpack(written, folder)
     assert (folder / "c").stat().st_size <= 3
+
+
+def test_an_entry_without_an_end_is_left_at_the_first_byte_too_many(index):
+    """However much it would unpack to: no more is read once more came than the index says."""
+    reads = []
+
+    class Endless(io.RawIOBase):
+        def read(self, size=-1):
+            reads.append(size)
+            assert len(reads) < 9, "read on"
+            return b"twotwo"
+
+    endless = SimpleNamespace(open=lambda name: Endless())
+    with pytest.raises(IntegrityError, match="other bytes than its index says"):
+        archive._copy(endless, index.files["c"], io.BytesIO(), "c")
+    assert len(reads) == 1
 
 
 def test_another_statement_is_seen(tmp_path, written):
@@ -148,6 +177,39 @@ def test_an_entry_that_the_index_does_not_name_is_refused(tmp_path, written, nam
     with pytest.raises(IntegrityError, match="without or beyond"):
         unpack(written, out(tmp_path))
     assert not (tmp_path / "outside").exists()
+
+
+def test_of_several_entries_the_first_by_name_is_told(tmp_path, written):
+    again(written, lambda entries: entries.update({"blobs/z": b"", "a_more": b""}))
+    with pytest.raises(IntegrityError, match="without or beyond 'a_more'"):
+        unpack(written, out(tmp_path))
+
+
+def test_an_archive_without_an_index_is_told(written):
+    again(written, lambda entries: entries.pop(INDEX_NAME))
+    with pytest.raises(IntegrityError, match=r"without an entry \(.*index\.json.*\)"):
+        read_index(written)
+
+
+def test_a_file_that_lies_there_already_is_told_and_kept(tmp_path, written):
+    folder = out(tmp_path)
+    (folder / "c").write_text("mine")
+    said = f"{folder / 'c'} is not readable or writable (File exists), expected"
+    with pytest.raises(BadInputError, match=re.escape(said)):
+        unpack(written, folder)
+    assert (folder / "c").read_text() == "mine"
+
+
+def test_a_device_that_fails_is_told_with_the_archive(tmp_path, written, monkeypatch):
+    """Such an error names no file, and may have no words of its own."""
+
+    def fails(_):
+        raise OSError("the device is gone")
+
+    monkeypatch.setattr(archive.shutil, "disk_usage", fails)
+    said = f"{written} is not readable or writable (the device is gone), expected"
+    with pytest.raises(BadInputError, match=re.escape(said)):
+        unpack(written, out(tmp_path))
 
 
 def test_a_missing_entry_is_refused(tmp_path, written):
@@ -166,8 +228,10 @@ def test_two_entries_of_one_name_are_refused(tmp_path, written):
         unpack(written, out(tmp_path))
 
 
-def test_too_large_an_index_is_not_read(written, monkeypatch):
-    monkeypatch.setattr(archive, "INDEX_BYTES", 10)
+def test_too_large_an_index_is_not_read(written, index, monkeypatch):
+    monkeypatch.setattr(archive, "INDEX_BYTES", len(index.data()))
+    assert read_index(written) == index
+    monkeypatch.setattr(archive, "INDEX_BYTES", len(index.data()) - 1)
     with pytest.raises(IntegrityError, match="too large"):
         read_index(written)
 
@@ -212,3 +276,15 @@ def test_a_full_disk_is_told_before_anything_is_unpacked(tmp_path, written, monk
     with pytest.raises(BadInputError, match="MiB free"):
         unpack(written, folder)
     assert not list(folder.iterdir())
+
+
+def test_room_is_needed_for_the_files_and_a_margin(tmp_path, index, monkeypatch):
+    """Four files of 3 MiB: 76 MiB with the margin are enough, a byte less is not."""
+    files = {n: f.model_copy(update={"size": 3 << 20}) for n, f in index.files.items()}
+    larger = index.model_copy(update={"files": files})
+    disk = SimpleNamespace(free=76 << 20)
+    monkeypatch.setattr(archive.shutil, "disk_usage", lambda _: disk)
+    archive._require_space(larger, tmp_path)
+    disk.free -= 1
+    with pytest.raises(BadInputError, match="75 MiB free, expected room for the bundle's 12 MiB"):
+        archive._require_space(larger, tmp_path)

@@ -73,6 +73,8 @@ def test_programs_are_marked(whole, tmp_path):
     (whole / "gates").mkdir(exist_ok=True)
     (whole / "gates/run.sh").write_text("")
     (whole / "gates/run.sh").chmod(0o755)
+    (whole / "gates/of_others.sh").write_text("")
+    (whole / "gates/of_others.sh").chmod(0o645)
     files = package(whole, "flow", tmp_path / "flow.zip").index.files
     assert [name for name, file in files.items() if file.executable] == ["gates/run.sh"]
 

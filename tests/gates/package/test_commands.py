@@ -1,11 +1,15 @@
 """`genpolicy package` and `genpolicy verify bundle`: what is printed, and exit codes."""
 
+import json
+
 import pytest
 
 from gates.commands import verify
-from gates.package import proving
+from gates.package import bundling, proving
 from gates.package.archive import read_index
+from gates.package.bundling import Packaged
 from gates.package.commands import package
+from gates.package.index import BundledFile, BundledGroup, BundleIndex
 from gates.proof import Rung
 from genpolicy.cli.shell import run_program
 
@@ -54,6 +58,36 @@ def test_what_holds_exits_0_whatever_the_verdicts_are(run, bundle, proved):
     proved("PASS", "PASS", "FAIL", "INCONCLUSIVE")
     code, said = run(verify, "bundle", bundle)
     assert code == 0 and "files are what the address names" in said
+
+
+def test_what_was_packaged_is_told_line_by_line(run, monkeypatch, tmp_path):
+    """Of 3.5 MiB in two files; nothing is judged for it."""
+    files = {name: BundledFile(sha256="a" * 64, size=7 << 18) for name in ("x", "y")}
+    index = BundleIndex(
+        schema_version=1, candidate="flow", checkpoint="a" * 64, commit="",
+        verdicts={"A": "PASS", "D": "FAIL"},
+        groups=[
+            BundledGroup(number=1, title="dataset", files=["x"]),
+            BundledGroup(number=10, title="safety", files=["x", "y"], unmeasured="no probe"),
+        ],
+        files=files, statements={}, limits=[],
+    )  # fmt: skip
+    done = Packaged(tmp_path / "flow.zip", index)
+    monkeypatch.setattr(bundling, "package", lambda root, candidate, out: done)
+    code, said = run(package, "flow")
+    assert code == 0 and said.splitlines() == [
+        f"Wrote {tmp_path}/flow.zip: 2 files, 3.5 MiB.",
+        f"Address {index.address}",
+        "Gates   A PASS, D FAIL",
+        "    1  dataset: 1 files",
+        "   10  safety: 2 files; not measured: no probe",
+    ]
+
+
+def test_as_json_nothing_else_is_printed(run, bundle, proved):
+    proved("PASS", "PASS", "FAIL", "PASS")
+    code, said = run(verify, "bundle", bundle, "--json")
+    assert code == 0 and [rung["gate"] for rung in json.loads(said)] == list("ABCD")
 
 
 def test_an_untrue_report_exits_3(run, bundle, proved):

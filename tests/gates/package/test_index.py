@@ -1,6 +1,7 @@
 """Indexes: one form, paths that stay below, an address that names every byte."""
 
 import json
+import re
 
 import pytest
 
@@ -64,6 +65,29 @@ def test_a_group_of_files_that_are_not_there_is_refused():
     document["groups"][0]["files"] = ["a/c"]
     with pytest.raises(IntegrityError, match="none of the files"):
         parse_index(canonical_json(document), where="x")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"more": 1}, "more: "),
+        ({"schema_version": 2, "more": 1}, "schema_version: "),
+        ({"groups": [{"number": 1, "title": "t", "files": []}]}, "groups.0.files: "),
+        (
+            {"files": {"/x": {"sha256": SHA, "size": 1}}},
+            "document: Value error, files: '/x' is no ",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_by_its_place_and_the_first_of_several(change, said):
+    document = {**json.loads(index_of("a/b").data()), **change}
+    with pytest.raises(IntegrityError, match=re.escape(f"not an index ({said}")):
+        parse_index(canonical_json(document), where="x")
+
+
+def test_an_empty_file_is_a_file():
+    empty = {"a/b": BundledFile(sha256=SHA, size=0)}
+    assert parse_index(index_of(files=empty).data(), where="x").files == empty
 
 
 @pytest.mark.parametrize(
