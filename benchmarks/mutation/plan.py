@@ -57,7 +57,7 @@ TESTS = {
     "gates/card": (f"{GOLDEN}e.py", "tests/gates/card"),
     "gates/cause": ("tests/gates/cause", f"{GOLDEN}a.py", "tests/gates/need"),
     "gates/audit": ("tests/gates/audit",),
-    "gates/diagnosis": ("tests/gates/diagnosis",),
+    "gates/diagnosis": ("tests/gates/diagnosis/test_golden_answers.py", "tests/gates/diagnosis"),
     "gates/ledger": ("tests/gates/ledger",),
     "gates/package": ("tests/gates/package",),
     "gates/need": (f"{GOLDEN}a.py", "tests/gates/need", *JUDGED),

@@ -94,8 +94,8 @@ def _asked_lines(title: str, asked: Asked) -> Iterable[str]:
         yield _said(f"SPEAKS: {cause}", indent=2, then=4)
     for text in asked.undecided:
         yield _said(f"Not decided: {text}.", indent=2, then=4)
-    for text in (*asked.unknown, *asked.waits_for):
-        yield _said(f"Not known: {text}.", indent=2, then=4)
+    for text in (*asked.unknown, *asked.waits_for):  # some are sentences, which have an end
+        yield _said(f"Not known: {text.removesuffix('.')}.", indent=2, then=4)
     if not asked.numbers:
         yield _said("Nothing could be asked.", indent=2)
     elif not asked.causes:

@@ -99,7 +99,7 @@ def test_a_refusal_is_shown_while_it_is_the_last_word(tmp_path: Path) -> None:
     _lock(tmp_path, judged="judged again", read="b")
     times = tmp_path / "build" / "times" / "shadow.json"
     _record(tmp_path, "shadow", seconds=1.0, peak_mib=1, exit_code=3)
-    for second, seconds in ((1005, 1.0), (1001, None)):
+    for second, seconds in ((1005, 1.0), (1002, 1.0), (1001, None)):  # gate_b was at 1002
         os.utime(times, (second, second))
         lines = {line.stage: line for line in overview(tmp_path, prove_all(tmp_path))}
         assert lines["shadow"].seconds == seconds
@@ -129,6 +129,38 @@ def test_a_line_says_what_was_recorded_and_leaves_out_what_was_not() -> None:
     assert text[1].split() == ["audit", "done", "12.3", "s", "99", "MiB"]
     assert text[2] == "card"
     assert text[3].split() == ["12.3", "s"]
+
+
+WHOLE = [
+    Line("audit", "done", "", 12.34, 99),
+    Line("gate_a", "FAIL", "told_share", 1.0, 123456, ("act FAIL: x 1",), "OVERRIDDEN by ada"),
+    Line("card", "", "", None, None),
+]
+ROWS = (
+    "stage  verdict             time   memory",
+    "audit  done              12.3 s   99 MiB",
+    "gate_a FAIL               1.0 s 123456 MiB",
+    "card",
+    "                         13.3 s",
+)
+
+
+def test_the_whole_table_is_told() -> None:
+    head, audit, gate, card, total = ROWS
+    assert as_text(WHOLE).splitlines() == [
+        f"{head}  decided by", audit, f"{gate}  told_share; act FAIL: x 1; OVERRIDDEN by ada", card,
+        total,
+    ]  # fmt: skip
+    below = ("  told_share", "  act FAIL: x 1", "  OVERRIDDEN by ada")
+    assert as_text(WHOLE, terminal=True).splitlines() == [head, audit, gate, *below, card, total]
+
+
+def test_what_is_red_and_what_is_green_fills_its_column() -> None:
+    green, red = "\x1b[32m", "\x1b[31m"
+    text = as_text(WHOLE, terminal=True, colour=True)
+    assert f"audit  {green}done           \x1b[0m   12.3 s" in text
+    assert f"gate_a {red}FAIL           \x1b[0m    1.0 s" in text
+    assert f"{red}  OVERRIDDEN by ada\x1b[0m" in text and text.count("\x1b[0m") == 3
 
 
 LONG = "a_name_without_a_space_" * 9
