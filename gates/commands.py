@@ -177,7 +177,7 @@ def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
     """Print one report as it lies there, not proved."""
     from gates.overview import painted
     from gates.printed import coloured
-    from gates.readable import limit_text, measured_text
+    from gates.readable import found_text, limit_text
     from gates.report import read_report
 
     report, digest = read_report(root, _gate(letter))
@@ -193,7 +193,7 @@ def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
     for c in report.criteria:
         name = f"{c.id} ({c.candidate})" if c.candidate else c.id
         verdict = painted(c.verdict, wide=14, colour=colour)
-        print(f"  {verdict} {name}: {measured_text(c)}, required {limit_text(c)}")
+        print(f"  {verdict} {name}: {found_text(c)}, required {limit_text(c)}")
     return 0
 
 

@@ -298,7 +298,7 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
     said = undecided or decided.caveat
     why = f" ({said})" if said and (decided.measured is None or undecided) else ""
     look_at = next(item.look_at for item in spec.criteria if item.id == decided.id)
-    look_at = f"Should it be broken: {look_at}" if undecided else look_at
+    look_at = f"If it turns out to be broken: {look_at}" if undecided else look_at
     return f"First unmet: {decided.id}{of}{why}. {look_at}"
 
 

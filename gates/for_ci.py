@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from gates.overrides import OVERRIDDEN, OVERRIDES, said
 from gates.proof import Rung
-from gates.readable import limit_text, measured_text
+from gates.readable import found_text, limit_text
 from gates.report import Answer, Gate, GateReport
 from gates.verdicts import counting
 
@@ -125,7 +125,7 @@ def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
 
 
 def _text(answer: Answer) -> str:
-    held = f"{measured_text(answer)}, required {limit_text(answer)}"
+    held = f"{found_text(answer)}, required {limit_text(answer)}"
     return f"{answer.question} {held}{f' ({answer.caveat})' if answer.caveat else ''}"
 
 

@@ -15,7 +15,7 @@ import typer
 from gates.overrides import apart
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
-from gates.readable import limit_text, measured_text
+from gates.readable import found_text, limit_text
 from gates.report import read_report, stage_of
 from gates.verdicts import stopping
 from genpolicy.errors import GenpolicyError
@@ -90,7 +90,7 @@ def _stopped(root: Path, rung: Rung) -> Iterator[str]:
     report = read_report(root, rung.gate)[0]
     for name, unmet in sorted(stopping(report).items()):
         if unmet:
-            held = f"{measured_text(unmet[0])}, required {limit_text(unmet[0])}"
+            held = f"{found_text(unmet[0])}, required {limit_text(unmet[0])}"
             yield f"{name} {unmet[0].verdict}: {unmet[0].id} {held}"
 
 

@@ -17,7 +17,7 @@ from gates.feasibility import gate as feasibility
 from gates.need import gate as need
 from gates.overriders import require_in_force
 from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
-from gates.readable import limit_text, measured_text
+from gates.readable import found_text, limit_text
 from gates.report import (
     GATES,
     NAMES,
@@ -260,7 +260,7 @@ def require_pass(gate: Gate, report: GateReport) -> None:
         raise _refused(gate, "verdict", report.verdict, "PASS", report.decision)
     name = f"{decided.id}({decided.candidate})" if decided.candidate else decided.id
     action = f"{report.decision.rstrip('.')}. {report.diagnosis}".strip()
-    raise _refused(gate, name, measured_text(decided), limit_text(decided), action)
+    raise _refused(gate, name, found_text(decided, of_how_many=False), limit_text(decided), action)
 
 
 def _check_materials(root: Path, gate: Gate, report: GateReport) -> None:

@@ -5,6 +5,7 @@ stand in the JSON of the report.
 """
 
 import math
+import re
 
 from gates.report import Answer
 from gates.words import DIGITS, in_milli, number, percent, span, three
@@ -74,6 +75,28 @@ def measured_text(answer: Answer) -> str:
     return (
         "pending review" if answer.verdict == "PENDING_REVIEW" else human(answer, answer.measured)
     )
+
+
+def found_text(answer: Answer, *, of_how_many: bool = True) -> str:
+    """What was held against a limit, and of how many, for a sentence.
+
+    Of what is not decided the interval: its worse end alone looks like a limit that is broken.
+    """
+    undecided = answer.verdict == "INCONCLUSIVE" and answer.measured is not None
+    text = between(answer) if undecided and answer.interval else measured_text(answer)
+    return text + (of_units(answer) if of_how_many else "")
+
+
+def of_units(answer: Answer) -> str:
+    """Of how many a number is, in brackets behind it; empty where it counts none."""
+    over = "over " if answer.counted.startswith("all ") else ""
+    return f" ({over}{rests_on(answer.counted)})" if answer.counted else ""
+
+
+def rests_on(counted: str) -> str:
+    """What a number counts, for a reader: `none of 1,080 arrivals`."""
+    text = re.sub(r"^0 of ", "none of ", counted)
+    return re.sub(r"\d{4,}", lambda found: f"{int(found[0]):,}", text)
 
 
 def limit_text(answer: Answer) -> str:

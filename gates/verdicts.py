@@ -7,7 +7,7 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.readable import limit_text, measured_text
+from gates.readable import found_text, limit_text
 from gates.report import Answer, Comparison, GateReport, Overridden, Verdict
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
@@ -118,7 +118,7 @@ def decided_text(report: GateReport) -> str:
     if decided is None:
         return ""
     of = f" ({decided.candidate})" if decided.candidate else ""
-    return f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
+    return f"{decided.id}{of}: {found_text(decided)}, required {limit_text(decided)}"
 
 
 def stopping(report: GateReport) -> dict[str, list[Answer]]:

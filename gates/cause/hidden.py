@@ -42,6 +42,7 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
                 limits["strata_effect"],
                 note=f"none of {len(numbers.strata)}; smallest adjusted p "
                 f"{_number(row.p_adjusted):.3g} ({_plain(row.variable)})",
+                counted=f"all {len(numbers.strata)} variables",
             ),
         )  # fmt: skip
     found = [row for row in clear if _wide_of(row, limits)]

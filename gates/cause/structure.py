@@ -46,17 +46,23 @@ def support(numbers: Numbers, limits: CauseLimits) -> Named:
 def _enough(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
     counts, what = numbers.counts, WORDS[numbers.kind]
 
-    def least(question: str, which: str, measured: float, note: str = "") -> Answer:
+    def least(
+        question: str, which: str, measured: float, note: str = "", counted: str = ""
+    ) -> Answer:
         return Answer(
-            question, Topic.SUPPORT, f"{which} {what}", measured, limits[question], ">=", note=note
-        )
+            question, Topic.SUPPORT, f"{which} {what}", measured, limits[question], ">=",
+            note=note, counted=counted,
+        )  # fmt: skip
 
     share = share_of(counts.analysed, counts.queries)
     return [
         least("supported_episodes", "held-out episodes with", counts.analysed_episodes),
-        least("held_out_situations", "held-out situations with", counts.analysed),
+        least(
+            "held_out_situations", "held-out situations with", counts.analysed,
+            counted=f"{counts.analysed_episodes} episodes",
+        ),
         least("supported_share", "share of held-out situations with", counts.share, share),
-    ]
+    ]  # fmt: skip
 
 
 def structure(numbers: Numbers, limits: CauseLimits) -> Named:
@@ -143,7 +149,7 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
     long_enough = Answer(
         "multimodal_situations", Topic.STRUCTURE,
         "situations that go on long enough to see them persist", kept.n,
-        limits["multimodal_situations"], ">=",
+        limits["multimodal_situations"], ">=", counted=f"{counts.two_mode_episodes} episodes",
     )  # fmt: skip
     margin = Answer(
         "persistence_margin", Topic.STRUCTURE,
@@ -156,6 +162,7 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
     persistent = Answer(
         "multimodal_situations", Topic.STRUCTURE, "situations whose modes persist",
         counts.persistent, limits["multimodal_situations"], ">=",
+        counted=f"{counts.two_mode_episodes} episodes",
     )  # fmt: skip
     answers = [modes, *components(numbers), long_enough, margin, persistent]
     white = all(_noisy(numbers, limits))

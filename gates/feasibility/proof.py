@@ -48,7 +48,7 @@ def checked_violations(evidence: Evidence, folder: str, journals: str) -> Measur
     _require_totals(found)
     text = f"{number(checked)} actions proved again, their motion by other geometry"
     broken = max(len(found.violations), sum(len(one.violations) for one in found.journals.values()))
-    return Measured(float(broken), caveat=text)
+    return Measured(float(broken), caveat=text, counted=f"all {checked} actions")
 
 
 def _require_totals(found: Checked) -> None:
@@ -89,7 +89,8 @@ def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Mea
     if excused:
         listed = ", ".join(f"{name} ({reason})" for name, reason in excused.items())
         text += f"; of them not asked of this task: {listed}"
-    return Measured(float(len(silent)), caveat=text)
+    tried = (found | set(CHECKS_ASKED_FOR)) - (set(excused) - set(missed))
+    return Measured(float(len(silent)), caveat=text, counted=f"all {len(tried)} mutants")
 
 
 def _is_excused(name: str, entry: LayerMutant) -> bool:

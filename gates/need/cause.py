@@ -58,7 +58,7 @@ def _named(evidence: Evidence, limits: CauseLimits) -> Cause:
 
 
 def as_the_cause(
-    question: str, evidence: Evidence, settings: NeedSettings, *, also: str = ""
+    question: str, evidence: Evidence, settings: NeedSettings, *, also: str = "", of: str = ""
 ) -> Measured:
     """What the cause itself answers to a question that a criterion asks as well.
 
@@ -69,6 +69,7 @@ def as_the_cause(
         evidence: What the audit wrote.
         settings: Limits and confidence.
         also: What the criterion shows beside it.
+        of: What it was asked of, where the answer counts no units.
 
     Raises:
         MissingEvidenceError: As `found_cause`; or nothing, or nothing known, stands to the limit.
@@ -91,7 +92,7 @@ def as_the_cause(
         answer.measured / unit,
         interval,
         text,
-        counted=answer.counted,
+        counted=answer.counted or of,
         recount=_recount(answer, evidence),
     )
 

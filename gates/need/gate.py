@@ -1,5 +1,7 @@
 """Gate A as a whole: its questions in the order in which a failure is diagnosed; all must hold."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from gates.cause import CauseLimits, CauseName, limits_of
@@ -17,23 +19,22 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
-from gates.report import stage_of
+from gates.report import Answer, stage_of
 from gates.settings import read_limits, read_params, read_settings
 from gates.words import NEXT
 
 ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
-SIMPLER = (
-    f"{NEXT}run the simpler policy that the criterion names; nothing in the data has to be mended."
-)
+SIMPLER = f"{NEXT}run {{policy}}; nothing in the data has to be mended."
 OPEN = (
-    f"{NEXT}record more episodes, to know whether the simpler policy that the criterion names is "
-    "enough; nothing in the data has to be mended."
+    f"{NEXT}record more episodes, to know whether {{policy}} is enough; nothing in the data has to "
+    "be mended."
 )
 NEAR = (
-    f"{NEXT}try the simpler policy that the criterion names: it is about as good as the limit "
-    "allows, more recordings will hardly tell on which side, and nothing in the data has to be "
-    "mended."
+    f"{NEXT}try {{policy}}: it is about as good as the limit allows, more recordings will hardly "
+    "tell on which side, and nothing in the data has to be mended."
 )
+NAMED = re.compile(r"; upper bound of (\S+) over ")
+"""In the caveat of a criterion that holds one simpler policy to its limit."""
 SIMPLER_ASKED = frozenset(
     item.id
     for item in (
@@ -59,12 +60,21 @@ def _cause(judged: Judged) -> str:
         simple = [a for a in judged.answers if a.id in unmet & SIMPLER_ASKED]
         if not simple:
             return text
+        advice = NEAR if any(hardly_decided(answer.caveat) for answer in simple) else OPEN
         if any(answer.verdict == "FAIL" for answer in simple):
-            return f"{text} {SIMPLER}"
-        return f"{text} {NEAR if any(hardly_decided(a.caveat) for a in simple) else OPEN}"
+            advice = SIMPLER
+        return f"{text} {advice.format(policy=_policy(simple))}"
     if judged.verdict != "PASS":
         return f"{text} Next: {cause.next_action}"
     return f"{text} One mode alone may still be enough: {ONE_MODE}"
+
+
+def _policy(simple: Sequence[Answer]) -> str:
+    """The simpler policy that the criteria hold to their limits, by its name where it is one."""
+    found = {said[1] for answer in simple if (said := NAMED.search(answer.caveat))}
+    if len(simple) == len(found) == 1:
+        return f"the simpler policy {found.pop()}"
+    return "the simpler policy that the criterion names"
 
 
 def _beside(judged: Judged) -> tuple[str, ...]:

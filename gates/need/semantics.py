@@ -6,7 +6,7 @@ from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.need.cause import as_the_cause, found_cause, waived_questions
 from gates.need.settings import AUDIT, NeedSettings
 from gates.need.waivers import require_questions
-from genpolicy.audit.rows import Asked, Clock
+from genpolicy.audit.rows import Asked, Calibration, Clock
 from genpolicy.evidence.documents.given import REFUSALS
 
 INGEST = "artifacts/ingest"
@@ -24,7 +24,8 @@ def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> 
     if found == 0:
         raise MissingEvidenceError("no recordings were found")
     text = f"{found} found, {accepted} accepted, {refused} refused"
-    return Measured(float(abs(accepted + refused - found)), caveat=text)
+    left = float(abs(accepted + refused - found))
+    return Measured(left, caveat=text, counted=f"all {found} recordings")
 
 
 @criterion(
@@ -44,7 +45,8 @@ def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
     remark = f"; waived without need here: {idle}" if idle else ""
     if len(left) == 0:
         waived = f", {len(silent)} of them waived" if len(silent) else ""
-        return Measured(0.0, caveat=f"{len(frame)} questions{waived}{remark}")
+        text = f"{len(frame)} questions{waived}{remark}"
+        return Measured(0.0, caveat=text, counted=f"all {len(frame)} questions")
     rows = zip(left["check"], left["reason"], strict=True)
     text = "; ".join(f"{check} ({reason})" for check, reason in rows)
     return Measured(None, caveat=f"not asked: {text}{remark}")
@@ -57,7 +59,9 @@ def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest clock offset that stands out; else the largest left after realignment, s."""
-    return as_the_cause("clock_residual_s", evidence, settings)
+    clocks = evidence.rows(f"{AUDIT}/clocks.parquet", Clock)
+    of = f"all {len(clocks)} clocks, one a stream and epoch"
+    return as_the_cause("clock_residual_s", evidence, settings, of=of)
 
 
 @criterion(
@@ -79,7 +83,9 @@ def lag_spread_rows(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest calibration residual over epochs, m."""
-    return as_the_cause("calibration_residual_m", evidence, settings)
+    epochs = evidence.rows(f"{AUDIT}/calibration.parquet", Calibration)
+    of = f"all {len(epochs)} calibration epochs"
+    return as_the_cause("calibration_residual_m", evidence, settings, of=of)
 
 
 @criterion(
@@ -116,4 +122,4 @@ def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
     asked_here = {answer.question for answer in asked}
     for name in sorted(asked_here & set(waived_questions(settings.limits))):
         text += f"; {name} is waived, and asked here by the packaged limit"
-    return Measured(float(len(red)), caveat=text)
+    return Measured(float(len(red)), caveat=text, counted=f"all {len(asked)} numbers")

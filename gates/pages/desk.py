@@ -10,9 +10,9 @@ from gates.closeness import BY_CHANCE, Closeness, by_room, closeness, first_what
 from gates.doubt import Doubt, sentence
 from gates.doubts import of_a_ladder
 from gates.more import INSIDE, hardly_decided
-from gates.pages.numbers import at_its_end, beyond, judged_at, rests_on
+from gates.pages.numbers import at_its_end, beyond, judged_at
 from gates.protection import REHEARSED
-from gates.readable import between, human
+from gates.readable import between, human, of_units
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport, report_bytes
 from gates.verdicts import decided_by
 from gates.words import advice_of
@@ -29,8 +29,8 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
 UNREADABLE = "UNREADABLE"
 NO_CARD = "no card of a rehearsal can be signed"
 REAL_LADDER = (
-    "Limits that protect people may be looser here; a card is of a ladder without "
-    "`rehearsal: true`."
+    "Limits that protect people may be looser here; a card is of a ladder whose params.yaml does "
+    "not say `rehearsal: true`."
 )
 JUDGE_AGAIN = "It says nothing of the one that lies here; judge again: `make ladder`."
 NOTHING_BROKEN: Mapping[Gate, str] = {}
@@ -203,7 +203,7 @@ def _asked(
     if stopped == "E" and promoted:
         title = f"Asked of you: let {promoted} move a robot, supervised, inside one envelope?"
         return Asked(title, sentence(reports["D"].decision), pending)
-    title = f"Nothing is asked of you yet: the ladder stops at gate {stopped}, {NAMES[stopped]}"
+    title = f"Nothing is asked of you yet: the ladder stops at gate {stopped} ({NAMES[stopped]})"
     if report is None:
         return Asked(title, "It was not judged: `make ladder`.", "")
     decided = decided_by(report)
@@ -221,7 +221,7 @@ def _in_vain(
 ) -> Asked | None:
     """Why nobody can be asked, where no verdict says so: what lies there is broken, or practice."""
     if stopped is not None and stopped in unreadable:
-        what = f"the report of gate {stopped}, {NAMES[stopped]}, cannot be read"
+        what = f"the report of gate {stopped} ({NAMES[stopped]}) cannot be read"
         return Asked(f"Nothing is asked of you: {what}", sentence(unreadable[stopped]), "")
     for gate in GATES[: GATES.index(stopped or "E") + 1]:
         if below := other_below(reports, gate):
@@ -251,8 +251,7 @@ def _against(answer: Answer) -> str:
     found = human(answer, answer.measured)
     if answer.interval is not None:
         found = between(answer)
-    found += f" ({rests_on(answer.counted)})" if answer.counted else ""
-    return f"Measured {found}; required {sign} {human(answer, answer.threshold)}."
+    return f"Measured {found}{of_units(answer)}; required {sign} {human(answer, answer.threshold)}."
 
 
 def _next(decided: Answer, decision: str) -> str:

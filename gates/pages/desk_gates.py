@@ -30,6 +30,7 @@ MODES = f"{AUDIT}/modes.parquet"
 UNBROKEN = "\u00a0"
 """A space at which no line ends, so that a share and its counts stay readable in a narrow cell."""
 UNREADABLE = "no report that can be read"
+NOT_JUDGED = "this gate was not judged"
 MOST = 200
 """Characters of a reason; the gate's page has all of it."""
 KEPT = 16
@@ -76,7 +77,7 @@ def _exhibit(
 ) -> Exhibit:
     if report is None:
         there = (evidence.root / report_path(gate)).is_file()
-        return Exhibit(gate, NAMES[gate], missing=UNREADABLE if there else "not judged")
+        return Exhibit(gate, NAMES[gate], missing=UNREADABLE if there else NOT_JUDGED)
     if gate == "E":
         return _signatures(signing)
     sources = dict.fromkeys(path for item in SHOWN[gate] for path in (item.source, *item.also))

@@ -17,7 +17,7 @@ from gates.settings import read_params
 from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import GenpolicyError
 
-NOBODY = "nobody who is named"
+NOBODY = "an author who is not named"
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """What a page says of a criterion's numbers: against what, where judged, from which rows."""
 
-import re
-
 from gates.readable import EVIDENCE, between, human
 from gates.report import Answer, Recount
 from gates.words import number, three
@@ -86,9 +84,3 @@ def beyond(answer: Answer) -> str:
     text = human(answer, abs(found - limit)).removeprefix("×")
     text = f"{text.removesuffix(' %')} points" if text.endswith(" %") else text
     return f"{'over' if answer.comparison == '<=' else 'short'} by {text}"
-
-
-def rests_on(counted: str) -> str:
-    """What a number counts, for a reader: `none of 1,080 arrivals`."""
-    text = re.sub(r"^0 of ", "none of ", counted)
-    return re.sub(r"\d{4,}", lambda found: f"{int(found[0]):,}", text)

@@ -1,18 +1,20 @@
 """HTML pages: one self-contained file per gate, and the ladder's front page.
 
 Autoescape is on and nothing from data is marked safe; the only markup passed in are the figures
-drawn here. Numbers stand as `<data value="...">` with the JSON number, so that a test can read
-them back.
+drawn here, and `<code>` around what a sentence has between backticks. Numbers stand as
+`<data value="...">` with the JSON number, so that a test can read them back.
 """
 
 import dataclasses
 import functools
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from gates.doubt import texts_once
 from gates.evidence import Evidence, MissingEvidenceError
@@ -68,6 +70,8 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCar
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.style import page_style
 
+CODE = re.compile(r"`([^`\n]+)`")
+"""In a sentence: a command, a file or a name, as it is typed."""
 MARKS = {
     "PASS": "✓",
     "FAIL": "✕",
@@ -269,13 +273,20 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
 @functools.cache
 def _environment() -> Environment:
     """Templates, each compiled once in a process."""
-    return Environment(
+    found = Environment(
         loader=PackageLoader("gates.pages"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    found.filters["coded"] = coded
+    return found
+
+
+def coded(text: str) -> Markup:
+    """A sentence with what stands between backticks as code; all of it is escaped first."""
+    return Markup(CODE.sub(r"<code>\1</code>", str(escape(text))))
 
 
 def _render(template: str, **values: Any) -> str:

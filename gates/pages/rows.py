@@ -19,10 +19,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from gates.pages.numbers import rests_on
 from gates.pages.rows_files import RowsFile, lines_of, sampled, whole_or_counted
 from gates.pages.rows_led_to import led_to
 from gates.pages.rows_signed import signature_rows
+from gates.readable import rests_on
 from gates.report import Answer, GateReport, report_path
 from gates.stress.rollouts import ROLLOUTS
 from gates.words import number

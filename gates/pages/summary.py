@@ -7,13 +7,13 @@ import re
 
 from gates.doubt import texts_once
 from gates.overrides import OVERRIDDEN, said
-from gates.pages.numbers import judged_at, limit_said, rests_on
+from gates.pages.numbers import judged_at, limit_said
 from gates.pages.table import deciding, not_asked, overridden, passed_by, stops, tally, waived
-from gates.readable import between, human
+from gates.readable import between, human, rests_on
 from gates.report import NAMES, Answer, GateReport, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
-PROOF = "python -m gates verify"
+PROOF = "genpolicy verify report"
 MARKS = {"PASS": "✓", "FAIL": "✕", "INCONCLUSIVE": "?", "PENDING_REVIEW": "…"}
 HEAD = (
     "| verdict | criterion | candidate | measured | rests on | judged at | required | owner |",

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from gates.pages.numbers import limit_said
-from gates.readable import human, measured_text
+from gates.readable import found_text, human
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
 from gates.verdicts import counting, decided_by, overridden_here, stopping
@@ -135,7 +135,7 @@ def deciding(report: GateReport) -> str:
 
 def against(criterion: Answer) -> str:
     """Measured against required, as a person reads numbers."""
-    return f"{measured_text(criterion)}, required {limit_said(criterion)}"
+    return f"{found_text(criterion)}, required {limit_said(criterion)}"
 
 
 def stops(report: GateReport) -> dict[str, str]:

@@ -182,11 +182,12 @@ def samples_difference(
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     require_fixtures(rows, settings, candidate)
     seeds = rows["seed"].nunique()
+    counted = f"all {len(rows)} samples"
     text = f"{len(rows)} samples {trainings(seeds)}, {unequal} not bit-equal"
     if candidate not in settings.brought:
         text += _where_drawn(rows, settings.device)
         require_as_trained(evidence, rows, candidate, identity_of(evidence, candidate))
-    return Measured(largest, caveat=text)
+    return Measured(largest, caveat=text, counted=counted)
 
 
 def _where_drawn(rows: pd.DataFrame, device: str) -> str:

@@ -1,14 +1,17 @@
 """What the README says of the default ladder, made from the reports that lie in the repository.
 
-`python tests/contracts/readme.py --write` puts it between its two marks, and the contract tests
-hold it there: a number that a report does not say any more cannot stay.
+`python tests/contracts/readme.py --write` puts it between its two marks, and draws what a terminal
+shows; the contract tests hold both there: a number that a report does not say any more cannot stay.
 """
 
 import json
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import terminal
 
 from flows.estimate import DOCUMENTED
 from gates.overview import Line, as_text
@@ -18,6 +21,7 @@ from gates.words import advice_of
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
+PICTURE = Path("docs/pictures/terminal.svg")
 BEGIN, END = "<!-- from reports/: begin -->\n", "<!-- from reports/: end -->\n"
 SHOT_BEGIN, SHOT_END = "<!-- of a run: begin -->\n", "<!-- of a run: end -->\n"
 GATES = "ABCDE"
@@ -88,16 +92,32 @@ def number(value: float, name: str) -> str:
 
 
 def run(found: dict[str, dict]) -> str:
-    """How long a run takes, as the program says before one, and what a terminal shows behind it.
-
-    Of the table the gates: what the other stages took on a machine is in no report.
-    """
+    """How long a run takes, as the program says before one, and what a terminal shows behind it."""
     _, _, takes = DOCUMENTED.partition(". ")
+    return "\n".join([f"{takes}.", "", f"![{title(found)}]({PICTURE})", ""])
+
+
+def shown(found: dict[str, dict], *, colour: bool = False) -> list[str]:
+    """What a terminal shows of the gates, as the program prints it.
+
+    Without the other stages, and without the columns of time and memory: what a machine took is
+    in no report.
+    """
     lines = [_line(gate, found.get(gate)) for gate in GATES]
-    *table, _sum_of_no_times = as_text(lines, terminal=True).splitlines()
+    *table, _sum_of_no_times = as_text(lines, terminal=True, colour=colour).splitlines()
     head, *rows = table
-    shown = [head.partition(" time")[0].rstrip(), *rows]
-    return "\n".join([f"{takes}.", "", "```text", *shown, "```", ""])
+    return ["$ genpolicy gates summary", head.partition(" time")[0].rstrip(), *rows]
+
+
+def title(found: dict[str, dict]) -> str:
+    """What the picture shows, for who does not see it."""
+    said = (f"{gate} {found[gate]['verdict'] if gate in found else 'NOT JUDGED'}" for gate in GATES)
+    return f"The end of a run in a terminal: {', '.join(said)}"
+
+
+def picture(found: dict[str, dict]) -> str:
+    """The same as a picture, in the colours of a terminal."""
+    return terminal.drawn(shown(found, colour=True), title=title(found))
 
 
 def _line(gate: str, report: dict | None) -> Line:
@@ -129,3 +149,4 @@ if __name__ == "__main__":
     if sys.argv[1:] != ["--write"]:
         sys.exit("usage: python tests/contracts/readme.py --write")
     README.write_text(whole(README.read_text(), reports()))
+    (ROOT / PICTURE).write_text(picture(reports()))

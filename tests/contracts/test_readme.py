@@ -4,6 +4,7 @@ import copy
 import re
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -11,8 +12,10 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent))
 
 import readme
+import terminal
 
 from flows.estimate import DOCUMENTED
+from gates.overview import COLOURS
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -95,15 +98,59 @@ def test_the_readme_says_how_long_a_run_takes_and_what_a_terminal_shows_after_it
     said = readme.run(found)
     takes, _, shot = said.partition("\n\n")
     assert takes in f"{DOCUMENTED}." and re.search(r"`make smoke` \d+ to \d+ min", takes)
-    lines = shot.splitlines()
-    assert (lines[0], lines[-1]) == ("```text", "```") and max(map(len, lines)) <= 80
-    states = re.findall(r"^gate_([a-e]) +([A-Z_ ]+)$", shot, re.MULTILINE)
-    assert [(gate.upper(), state) for gate, state in states] == [
-        (gate, found[gate]["verdict"] if gate in found else "NOT JUDGED") for gate in "ABCDE"
-    ]
+    assert shot == f"![{readme.title(found)}](docs/pictures/terminal.svg)\n"
     moved = copy.deepcopy(found)
     moved["A"]["verdict"] = "FAIL"
     assert readme.run(moved) != said
+
+
+def test_the_picture_of_a_terminal_is_that_of_the_reports() -> None:
+    found = readme.reports()
+    assert (ROOT / readme.PICTURE).read_text() == readme.picture(found), (
+        "run `python tests/contracts/readme.py --write`"
+    )
+    moved = copy.deepcopy(found)
+    item = next(i for i in moved["A"]["criteria"] if i["id"] == "remedy_valid_share")
+    item["interval"] = [0.123, item["interval"][1]]
+    assert readme.picture(moved) != readme.picture(found)
+
+
+def test_the_picture_of_a_terminal_shows_its_lines_as_text_and_in_its_colours() -> None:
+    found = readme.reports()
+    lines = readme.shown(found)
+    drawing = ElementTree.fromstring(readme.picture(found))
+    rows = drawing.findall("{*}text")
+    assert ["".join(row.itertext()).rstrip() for row in rows] == lines
+    assert max(map(len, lines)) <= 80
+    states = [re.match(r"gate_([a-e]) +([A-Z_ ]+?) *$", line) for line in lines]
+    assert [(state[1].upper(), state[2]) for state in states if state] == [
+        (gate, found[gate]["verdict"] if gate in found else "NOT JUDGED") for gate in "ABCDE"
+    ]
+    inks = {"".join(span.itertext()).strip(): span.get("class") for span in drawing.iter()
+            if span.tag.endswith("tspan")}  # fmt: skip
+    verdict = found["A"]["verdict"]
+    assert COLOURS[verdict] == inks[verdict]
+
+
+def test_a_line_wider_than_a_terminal_is_not_drawn() -> None:
+    terminal.drawn([f"\x1b[31m{'x' * 80}\x1b[0m"], title="fits")
+    with pytest.raises(ValueError, match="81 columns, expected at most 80"):
+        terminal.drawn(["x" * 81], title="does not")
+
+
+@pytest.mark.parametrize("scheme", [terminal.LIGHT, terminal.DARK])
+def test_every_colour_of_the_picture_can_be_read(scheme: dict[str, str]) -> None:
+    """WCAG: 4.5 to 1 for text of this size."""
+
+    def luminance(colour: str) -> float:
+        parts = (int(colour[n : n + 2], 16) / 255 for n in (1, 3, 5))
+        linear = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+        return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+    ground = luminance(scheme["ground"])
+    for name in scheme.keys() - {"ground"}:
+        low, high = sorted((luminance(scheme[name]), ground))
+        assert (high + 0.05) / (low + 0.05) >= 4.5, name
 
 
 def test_a_row_is_as_a_person_reads_it() -> None:

@@ -6,6 +6,7 @@ import evidence
 import pandas as pd
 import pytest
 
+from gates.doubts_of_evidence import few_units
 from gates.pages.rows import rows_of
 from gates.proof import judge
 from gates.readable import human
@@ -25,7 +26,7 @@ def test_an_interval_says_how_many_independent_units_it_is_of(ladder, gate):
 
 
 OF_NO_UNITS = {"parameter_budget_deviation", "strata_effect"}
-"""Shares that count nothing: of the parameters of a network, and none where no stratum explains."""
+"""Shares that are of no sample: of the parameters of a network, and of all variables together."""
 
 
 @pytest.mark.parametrize("gate", "ABCD")
@@ -55,8 +56,42 @@ def test_the_desk_and_the_page_show_what_a_number_rests_on(ladder):
         assert counted in (ladder / f"reports/{page}.html").read_text()
 
 
+ALL_OF = {
+    ("A", "refused_recordings_accounted"): "50 recordings",
+    ("A", "unasked_checks"): "3 questions",
+    ("A", "clock_residual_s"): "4 clocks, one a stream and epoch",
+    ("A", "calibration_residual_m"): "2 calibration epochs",
+    ("A", "data_defects"): "3 numbers",
+    ("A", "strata_effect"): "3 variables",
+    ("A", "baselines_matched"): "7 simpler policies",
+    ("A", "factors_isolated"): "5 variants",
+    ("B", "samples_difference"): "8 samples",
+    ("C", "checker_violations"): "1000 actions",
+    ("C", "mutants_undetected"): "95 mutants",
+    ("D", "checker_violations"): "5000 actions",
+}
+"""By hand, from the evidence: what is asked of everything that there is, and how much that is."""
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_what_is_asked_of_everything_says_how_much_that_is_and_is_no_small_sample(judged, gate):
+    report = judged(gate)
+    counted = {(gate, c.id): c.counted for c in report.criteria}
+    assert {key: counted[key] for key in ALL_OF if key[0] == gate} == {
+        key: f"all {said}" for key, said in ALL_OF.items() if key[0] == gate
+    }
+    small = [doubt.text for doubt in few_units(report)]
+    assert not any(f"{name} (" in text for text in small for _, name in ALL_OF)
+
+
+def test_a_count_of_situations_says_of_how_many_episodes_they_are(judged):
+    counted = {c.id: c.counted for c in judged("A").criteria}
+    assert re.fullmatch(r"\d+ episodes", counted["held_out_situations"])
+    assert re.fullmatch(r"\d+ episodes", counted["multimodal_situations"])
+
+
 def test_a_number_that_counts_no_units_says_of_how_many_rows_it_is(ladder):
-    """On the desk, at its bar; what reads one document alone has no rows to count."""
+    """On the desk, at its bar."""
     report = write_gate(ladder, "A")
     write_index(ladder)
     text = (ladder / "reports/index.html").read_text()
@@ -64,9 +99,8 @@ def test_a_number_that_counts_no_units_says_of_how_many_rows_it_is(ladder):
     frame = pd.read_parquet(ladder / "artifacts/audit/clocks.parquet")
     named = {c.id: c for c in report.criteria}
     assert rows.rests_on(named["lag_spread_rows"]) == f"{len(frame)} rows"
-    assert rows.rests_on(named["clock_residual_s"]).endswith(" tables")
+    assert rows.rests_on(named["cause_accepted"]).endswith(" tables")
     assert rows.rests_on(named["label_disagreement"]) == "none of 40 replays"
-    assert rows.rests_on(named["refused_recordings_accounted"]) == ""
     shown = [row.partition("</tr>")[0] for row in text.split("<tr")[1:]]
     shown = [row for row in shown if "#lag_spread_rows" in row]
     assert len(shown) == 2, "its bar, and beside its owner's name"

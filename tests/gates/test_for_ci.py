@@ -59,8 +59,8 @@ def test_a_reader_is_told_three_digits_and_a_machine_all_of_them():
     fell = criterion("INCONCLUSIVE").model_copy(update=told)
     found = cases([rung("INCONCLUSIVE")], report(fell))
     ((test,),) = suites(found)
-    assert "How much? 50.8 %, required <= 50 %" in test[1].get("message")
-    assert "50.8 %25, required <= 50 %25" in as_github(found)
+    assert "How much? 35.6 to 50.8 %, required <= 50 %" in test[1].get("message")
+    assert "35.6 to 50.8 %25, required <= 50 %25" in as_github(found)
     assert {one.get("name"): float(one.get("value")) for one in test[0]} == {
         "measured": 0.507708123456, "low": 0.355647, "high": 0.507708123456, "limit": 0.5,
     }  # fmt: skip

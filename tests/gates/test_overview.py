@@ -206,7 +206,9 @@ def test_who_fell_is_named_with_number_and_limit_where_another_passes(ladder: Pa
     write_bytes(ladder / report_path("D"), report_bytes(judge(ladder, "D")))
     lines = {line.stage: line for line in overview(ladder, prove_all(ladder))}
     assert lines["gate_d"].verdict == "PASS"
-    assert lines["gate_d"].stopped == ("diffusion FAIL: latency_p95_s 9 s, required <= 400 ms",)
+    assert lines["gate_d"].stopped == (
+        "diffusion FAIL: latency_p95_s 9 s (80 starts), required <= 400 ms",
+    )
     assert lines["gate_c"].stopped == ()
 
 

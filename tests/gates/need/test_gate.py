@@ -188,8 +188,9 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     ("every", "told", "following"),
     [
         (3, "about 1.8 times as many (30 episodes now) show that it holds",
-         "record more episodes, to know whether the simpler policy"),
-        (2, f"{HARDLY} (30 episodes now) may not decide", "try the simpler policy that"),
+         "record more episodes, to know whether the simpler policy bc_noise is enough"),
+        (2, f"{HARDLY} (30 episodes now) may not decide",
+         "try the simpler policy bc_noise: it is about as good"),
     ],
 )  # fmt: skip
 def test_where_it_is_open_whether_a_simpler_policy_does_nobody_is_told_to_take_it(
@@ -212,7 +213,7 @@ def test_where_it_is_open_whether_a_simpler_policy_does_nobody_is_told_to_take_i
     assert f"Next: {following}" in report.diagnosis
     assert "run the simpler policy" not in report.diagnosis
     assert f"({INSIDE}: {told}" in report.diagnosis
-    assert "Should it be broken: Baselines:" in report.diagnosis
+    assert "If it turns out to be broken: Baselines:" in report.diagnosis
 
 
 def _independent(entries):

@@ -46,7 +46,7 @@ def test_a_rehearsal_asks_for_no_signature_and_says_why(ladder, judged, waits):
     text = waits(caveats=(*judged("E").caveats, f"{REHEARSED} Looser: one_limit."))
     found = desk(ladder)
     assert found.asked.title == "Nothing is asked of you: no card of a rehearsal can be signed"
-    assert "without `rehearsal: true`" in found.asked.text and found.asked.pending == ""
+    assert "not say `rehearsal: true`" in found.asked.text and found.asked.pending == ""
     assert (found.boxes[-1].number, found.boxes[-1].of) == (
         "", "no card of a rehearsal can be signed",
     )  # fmt: skip
@@ -81,7 +81,7 @@ def test_a_damaged_report_is_told_apart_from_one_that_is_missing(ladder):
     path = ladder / "reports/gate_d.json"
     path.write_text(path.read_text()[:-40])
     text = index_page(ladder)
-    assert f"Nothing is asked of you: the report of gate D, {NAMES['D']}, cannot be read" in text
+    assert f"Nothing is asked of you: the report of gate D ({NAMES['D']}) cannot be read" in text
     asked = text[text.index('<div class="asked">') :].partition("</div>")[0]
     assert "not judged" not in asked and "dvc repro -f gate_d" in asked
     box = text[text.index('id="gate-d"') :].partition("</div>")[0]

@@ -99,7 +99,7 @@ def test_other_evidence_than_was_judged_is_not_shown(copied, judged):
     (copied / "reports/gate_b.json").write_text("{")
     (copied / "reports/gate_c.json").unlink(missing_ok=True)
     found = shown({"A": judged("A")}, copied)
-    assert [item.missing for item in found[1:3]] == [module.UNREADABLE, "not judged"]
+    assert [item.missing for item in found[1:3]] == [module.UNREADABLE, module.NOT_JUDGED]
 
 
 def test_the_same_evidence_is_drawn_once(whole, judged, exhibits, monkeypatch):

@@ -35,7 +35,7 @@ def test_who_made_it_is_said_before_a_card_is_drafted(copied, line):
     assert line(copied, "ABC").authors == "ada"
     params = copied / "params.yaml"
     params.write_text(yaml.safe_dump({**yaml.safe_load(params.read_text()), "card": {}}))
-    assert line(copied, "A").authors == "nobody who is named"
+    assert line(copied, "A").authors == "an author who is not named"
     params.unlink()
     assert line(copied, "A").authors == ""
 

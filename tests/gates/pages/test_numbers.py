@@ -5,8 +5,8 @@ import re
 import pytest
 from test_verdicts import criterion
 
-from gates.pages.numbers import at_its_end, beyond, judged_at, limit_said, recounted, rests_on
-from gates.readable import between, human
+from gates.pages.numbers import at_its_end, beyond, judged_at, limit_said, recounted
+from gates.readable import between, found_text, human, rests_on
 from gates.report import Recount
 
 
@@ -110,6 +110,27 @@ def test_what_does_not_hold_says_how_far_from_its_limit(
     assert not beyond(found.model_copy(update={"verdict": "PASS"}))
     assert not beyond(found.model_copy(update={"measured": None}))
     assert between(found.model_copy(update={"interval": None})) == ""
+
+
+@pytest.mark.parametrize(
+    ("verdict", "interval", "counted", "said"),
+    [
+        ("INCONCLUSIVE", (0.418, 0.554), "280 episodes", "41.8 to 55.4 % (280 episodes)"),
+        ("INCONCLUSIVE", None, "0 of 1080 episodes", "55.4 % (none of 1,080 episodes)"),
+        ("FAIL", (0.518, 0.554), "280 episodes", "55.4 % (280 episodes)"),
+        ("FAIL", None, "", "55.4 %"),
+        ("FAIL", None, "all 1200 actions", "55.4 % (over all 1,200 actions)"),
+    ],
+)
+def test_what_is_not_decided_is_said_by_its_interval_and_of_how_many(
+    verdict, interval, counted, said
+):
+    """Its worse end alone looks like a limit that is broken."""
+    answer = of(
+        id="x_share", comparison="<=", threshold=0.5, measured=0.554, verdict=verdict,
+        interval=interval, counted=counted,
+    )  # fmt: skip
+    assert found_text(answer) == said
 
 
 def test_a_limit_is_said_in_the_unit_of_its_number():

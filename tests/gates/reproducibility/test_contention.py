@@ -116,7 +116,7 @@ def test_a_busy_run_is_no_verdict_on_the_candidate(ladder, temperature, run):
         assert found.interval[0] < 1.1 and found.interval[1] == found.measured
         assert found.caveat.endswith(f"other programs had the processor and that may be all of it: "
                                      f"{AGAIN}")  # fmt: skip
-    assert AGAIN in report.diagnosis and "Should it be broken: Timing" in report.diagnosis
+    assert AGAIN in report.diagnosis and "If it turns out to be broken: Timing" in report.diagnosis
 
 
 @pytest.mark.parametrize("temperature", RATIOS)
