@@ -207,7 +207,7 @@ def _of_each(gate: Gate, wanted: str) -> bool:
 def _why(rung: Rung, judged: Mapping[Gate, GateReport]) -> str:
     gate = rung.gate
     if rung.verdict == "REFUSED":
-        return f"gate {gate} cannot be used: {rung.note}"
+        return f"gate {gate} cannot be used: {rung.note.rstrip('.')}"
     for below in GATES[: GATES.index(gate)]:
         if below in judged and judged[below].verdict != "PASS":
             said = judged[below].verdict

@@ -31,6 +31,7 @@ def test_a_report_that_is_not_what_the_files_say_is_not_used(ladder):
     found = read_reports(ladder)
     assert "B" not in found.judged and found.untrue == 3
     assert found.missing["B"].startswith("gate B cannot be used: ")
+    assert not found.missing["B"].endswith("."), "who prints it ends the sentence"
 
 
 def test_a_report_that_cannot_be_read_is_bad_input(ladder):
