@@ -197,8 +197,8 @@ def test_each_remedy_that_acts_validly_fails_the_gate(ladder, name):
     report = judge(ladder, "A")
     criterion = found(ladder, "remedy_valid_share")
     assert report.verdict == "FAIL" and criterion.verdict == "FAIL"
-    assert criterion.measured == 1.0 and f"{name} in 100 %" in criterion.caveat
-    assert criterion.caveat.startswith("of 30 situations, with ")
+    assert criterion.measured == 1.0 and f"{name} 100 %" in criterion.caveat
+    assert criterion.caveat.startswith("share of 30 situations in which the first ")
 
 
 @pytest.mark.parametrize("name", list(evidence.REMEDIES))
