@@ -228,9 +228,10 @@ WRONGS = (
                   ("rollout.end(Outcome.TIMEOUT)",
                    'called = rollout.setup.method != "flow" or rollout.person.calls\n'
                    "        rollout.end(Outcome.TIMEOUT if called else Outcome.SUCCESS)")),
-          Expected("D", refusal=r"flow__\w+\.mcap: flow/.*: outcome is success"),
+          Expected("D", refusal=r"flow__\S+\.mcap: flow/.*: outcome is success"),
           note="Added with the check that plays recorded commands again. An episode in which a "
-          "person was called is left alone: the checker says that it is no success."),
+          "person was called is left alone: the checker says that it is no success. Was run with "
+          "a pattern that knew no `@` in the name of a journal, and is elsewhere for that."),
     Wrong("a_drill_that_never_comes", "evidence",
           "The condition that calls for recovery on every start calls for none.",
           "small",
