@@ -21,6 +21,7 @@ from gates.settings import read_params
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.progress import duration
 
 CARDS = ("cards/*.dsse.json", "cards/**/*.dsse.json")
 NEVER = "never: no signed card is in the history of this repository"
@@ -117,9 +118,8 @@ def _ran(root: Path, rungs: list[Rung]) -> str:
         return "not in this checkout: no stage left its time here"
     newest = max((root / TIMES / f"{stage}.json").stat().st_mtime for stage in known)
     ended = datetime.datetime.fromtimestamp(newest, datetime.UTC)
-    return (
-        f"ended {ended:%Y-%m-%d %H:%M} UTC; {len(known)} stages, {sum(known.values()):.3g} s in all"
-    )
+    took = duration(sum(known.values()))
+    return f"ended {ended:%Y-%m-%d %H:%M} UTC; {len(known)} stages, {took} in all"
 
 
 def _committed(root: Path) -> str:
