@@ -25,6 +25,7 @@ from gates.settings import read_params
 from gates.stress.cost import _rollouts_with
 from gates.stress.rollouts import StressSettings
 from genpolicy.cli.main import main
+from genpolicy.contract.planner import PLANNER
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.stress.power import POWER_CORRELATION
 from genpolicy.seeds import stream
@@ -40,8 +41,9 @@ def planned(tmp_path, monkeypatch):
     for name in ("POWER_TRIALS", "CROWDED_TRIALS"):
         monkeypatch.setattr(planned_power, name, TRIALS)
 
-    def plan(monitors=None, power=None, **changes):
+    def plan(monitors=None, power=None, seeds=None, **changes):
         params = copy.deepcopy(read_params(ROOT))  # which is read once for all
+        params["policy"]["seeds"] = params["policy"]["seeds"] if seeds is None else seeds
         if power is not None:
             params["rehearsal"] = True
             owners = params["gate_d"]["limits"].values()
@@ -70,6 +72,16 @@ def hit(hits, starts):
         "perturbation": ["nominal"] * starts, "start": range(starts),
         "hit": [int(number < hits) for number in range(starts)],
     })  # fmt: skip
+
+
+def test_further_trainings_are_rolled_out_of_what_is_trained_alone(planned):
+    """The planner has no training, so that it would do the same again."""
+    one, three = planned(), planned(seeds=[0, 1, 2])
+    assert (one.further_seeds, one.further_rollouts) == (0, 0)
+    assert PLANNER in three.simple
+    per_method = (three.rollouts + three.graded_rollouts) // three.methods
+    assert three.further_seeds == 2
+    assert three.further_rollouts == 2 * (three.methods - 1) * per_method
 
 
 @pytest.mark.parametrize("starts", [36, 90])
