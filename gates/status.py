@@ -118,8 +118,8 @@ def _ran(root: Path, rungs: list[Rung]) -> str:
         return "not in this checkout: no stage left its time here"
     newest = max((root / TIMES / f"{stage}.json").stat().st_mtime for stage in known)
     ended = datetime.datetime.fromtimestamp(newest, datetime.UTC)
-    took = duration(sum(known.values()))
-    return f"ended {ended:%Y-%m-%d %H:%M} UTC; {len(known)} stages, {took} in all"
+    in_all = duration(sum(known.values()))
+    return f"ended {ended:%Y-%m-%d %H:%M} UTC; {len(known)} stages, {in_all} in all"
 
 
 def _committed(root: Path) -> str:
