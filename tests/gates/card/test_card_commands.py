@@ -80,7 +80,7 @@ def test_evidence_without_journals_is_neither_signed_nor_verified(
 ):
     """Synthetic: its tables agree with its lock file, and no journal says what they say."""
     # Its recordings and checkpoints are none either, which gate A would say before gate C is asked.
-    for name in ("rederive_audit", "rederive_policies"):
+    for name in ("rederive_ingest", "rederive_audit", "rederive_policies"):
         monkeypatch.setattr(f"gates.rederive.{name}", lambda *_: None)
     real = yaml.safe_load((request.config.rootpath / "params.yaml").read_text())
     params = yaml.safe_load((team.root / "params.yaml").read_text())
