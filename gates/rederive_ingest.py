@@ -22,6 +22,7 @@ from gates.rederive_shadow import TaskSection
 from gates.settings import section_of
 from gates.stated import mapping, refuse, section, short
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.data.assemble import MANIFEST_FILE, REFUSALS_FILE, SEAL
 from genpolicy.data.of_task import IngestSection, ingest_of_task
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
@@ -30,9 +31,8 @@ from genpolicy.integrity.tables import read_table
 
 RECORDED = "artifacts/record/episodes"
 SOURCE = "artifacts/task/source.json"
-REFUSALS = "refusals.json"
 TABLES = ("episodes", "frames")
-OF_BYTES = ("files", "manifest_body_sha256")
+OF_BYTES = ("files", SEAL)
 """Hashes of the manifest: of tables, whose last digits another processor rounds otherwise."""
 TOLERANCE, LAST_DIGITS = 1e-9, 4 * float(np.finfo(np.float64).eps)
 """Of a number, and of large ones (moments of a clock) as a share of it: another processor rounds
@@ -96,7 +96,7 @@ def _hold(stated: Path, again: Path) -> None:
     for name in TABLES:
         place = f"{INGEST}/{name}.parquet"
         _hold_table(place, *(read_table(at / f"{name}.parquet") for at in (stated, again)))
-    for place, name in ((MANIFEST, "manifest.json"), (f"{INGEST}/{REFUSALS}", REFUSALS)):
+    for place, name in ((MANIFEST, MANIFEST_FILE), (f"{INGEST}/{REFUSALS_FILE}", REFUSALS_FILE)):
         told, found = (mapping(read_json(at / name)) for at in (stated, again))
         told, found = ({k: v for k, v in d.items() if k not in OF_BYTES} for d in (told, found))
         if other := difference(told, found):
