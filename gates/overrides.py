@@ -16,7 +16,8 @@ from typing import Any, NamedTuple, NoReturn
 
 from gates.criterion import Criterion
 from gates.floors import BOUNDS
-from gates.preregistration import AT_LEAST, at, by_criterion
+from gates.planned_settings import AT_LEAST
+from gates.preregistration import at, by_criterion
 from gates.protection import is_rehearsal
 from gates.report import (
     GATES,

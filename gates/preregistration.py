@@ -11,11 +11,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import yaml
 
-from gates.may_differ import PLACE
+from gates.planned_settings import (
+    AT_LEAST,
+    CAUSE,
+    CAUSE_STRICT,
+    COSTS,
+    IF_STATED,
+    OPEN,
+    PLANNED,
+    SECTIONS,
+    SECTIONS_STRICT,
+    STATED,
+)
 from gates.report import GATES, Gate, stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import parse_yaml
@@ -25,118 +36,6 @@ PREREGISTRATION = "preregistration.yaml"
 NONE = f"Nothing was planned in writing: {PREREGISTRATION} is missing or malformed."
 
 
-class Planned(NamedTuple):
-    """A setting of the plan beside limits.
-
-    Attributes:
-        strict: On which side it is strict, `<=` or `>=`; '' where neither is.
-        gate: The lowest gate that judges by it, or whose evidence is made with it.
-    """
-
-    strict: str
-    gate: Gate
-
-
-PLANNED: Mapping[str, Planned] = {
-    "seed": Planned("", "A"),
-    "record.episodes": Planned(">=", "A"),
-    "record.shares": Planned("", "A"),
-    "ingest.train": Planned("", "A"),
-    "ingest.validation": Planned("", "A"),
-    "policy.seeds": Planned("", "A"),
-    "policy.network": Planned("", "A"),
-    "policy.training.updates": Planned("", "A"),
-    "policy.training.batch_size": Planned("", "A"),
-    PLACE: Planned("", "A"),
-    "train_generators.samplers": Planned("", "B"),
-    "candidates": Planned("", "B"),
-    "confidence": Planned(">=", "A"),
-    "gate_a.held_out_splits": Planned("", "A"),
-    "gate_a.deployed_conventions": Planned("", "A"),
-    "gate_a.generative_baselines": Planned("", "A"),
-    "gate_a.chunked_baseline": Planned("", "A"),
-    "gate_a.remedies": Planned("", "A"),
-    "gate_a.one_mode": Planned("", "A"),
-    "gate_a.conditioning_factors": Planned("", "A"),
-    "policy.fixtures": Planned(">=", "B"),
-    "latency.warm": Planned(">=", "B"),
-    "latency.cold": Planned(">=", "B"),
-    "latency.declared": Planned("", "B"),
-    "reload.samples": Planned(">=", "B"),
-    "gate_b.budget_reference": Planned("", "B"),
-    "gate_b.mode_minimum_share": Planned(">=", "B"),
-    "gate_c.required_fixtures": Planned("", "C"),
-    "gate_c.mode_observations": Planned(">=", "C"),
-    "shadow.observations": Planned(">=", "C"),
-    "stress.starts": Planned(">=", "D"),
-    "stress.margin": Planned(">=", "D"),
-    "stress.alpha": Planned("<=", "D"),
-    "stress.planned_effect": Planned("", "D"),
-    "stress.baselines": Planned("", "B"),
-    "stress.perturbations": Planned("", "D"),
-    "stress.episode_limit_s": Planned("", "D"),
-    "stress.samples": Planned("", "A"),
-    "stress.joining": Planned("", "B"),
-    "stress.person": Planned("", "D"),
-    "gate_d.tolerances": Planned("", "D"),
-    "gate_e.maximum_days": Planned("<=", "E"),
-}
-"""What the plan names beside limits."""
-IF_STATED: Mapping[str, Planned] = {
-    "gate_a.factors": Planned("", "A"),
-    "gate_a.waived_checks": Planned("", "A"),
-    "gate_d.utility": Planned("", "D"),
-}
-"""What it names only where it is stated; older plans ask every factor and compare success."""
-STATED: Mapping[str, Planned] = {**PLANNED, **IF_STATED}
-SECTIONS: Mapping[str, Gate] = {
-    "horizons": "A",
-    "feasibility": "A",
-    "audit": "A",
-    "train_baselines": "A",
-    "measure_baselines": "A",
-    "train_factors": "A",
-    "measure_factors": "A",
-    "execution": "C",
-    "shadow": "C",
-}
-"""Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
-SECTIONS_STRICT: Mapping[str, str] = {
-    **dict.fromkeys(
-        (
-            "feasibility.position_change_limit_m", "execution.deadline_s", "execution.watchdog_s",
-            "execution.maximum_age_s", "execution.maximum_divergence_m",
-            "execution.maximum_scene_shift_m", "execution.force_limit_n",
-        ), "<=",
-    ),
-    **dict.fromkeys(("measure_baselines.samples", "measure_factors.samples"), ">="),
-}  # fmt: skip
-"""On which side their settings are strict, those of each phase alike; others on neither."""
-CAUSE = "cause"
-CAUSE_STRICT: Mapping[str, str] = {
-    **dict.fromkeys(
-        (
-            "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share",
-            "lag_drift_rows", "gain_factor", "gain_epoch_factor", "magnitude_factor",
-            "frame_angle_rad", "swapped_columns", "faulty_episodes_share",
-        ),
-        "<=",
-    ),
-    **dict.fromkeys(("supported_episodes", "supported_share", "denial_share"), ">="),
-}  # fmt: skip
-"""On which side a limit of the cause is strict; of those left out, each side accepts something."""
-AT_LEAST = frozenset(
-    (
-        "held_out_situations", "multimodal_situations", "persistence_margin", "mode_success_lower",
-        "mode_feasible_share", "mean_defeated_share", "cause_accepted", "mode_coverage_lower",
-        "admissible_share", "corrupted_refused_share", "verdict_reachable",
-        "nominal_success_lower", "stress_success_lower", "recovery_success_lower",
-        "promotion_e_value", "upstream_passed", "signature_valid", "reviewer_independent",
-        "owners_signed", "not_expired",
-    )
-)  # fmt: skip
-"""Criteria that may not be lower than their limit, all others not higher; who edits the plan
-would edit what counts as looser, were it read from there."""
 HEAD = """\
 # Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves
 # afterwards shows in the report of every gate that judges by it and on the card.
@@ -217,8 +116,11 @@ def _side(place: str) -> str:
     section, _, name = place.partition(".")
     if section in SECTIONS:
         return _strict(place)
-    if name.startswith(f"{CAUSE}."):
-        return CAUSE_STRICT.get(name.partition(".")[2], "")
+    part, _, item = name.partition(".")
+    if part == CAUSE:
+        return CAUSE_STRICT.get(item, "")
+    if part == COSTS:
+        return ""
     return ">=" if name in AT_LEAST else "<="
 
 
@@ -263,13 +165,18 @@ def _parsed(data: bytes) -> Any:
 
 
 def _kind_at(place: str, before: object, now: object) -> Kind:
-    """As `_kind`; of what may differ, more settings are looser and fewer tighter."""
-    if place != PLACE or not (isinstance(before, list) and isinstance(now, list)):
+    """As `_kind`; of what may differ or is excepted, more entries are looser and fewer tighter."""
+    if place not in OPEN or not all(isinstance(value, list | dict) for value in (before, now)):
         return _kind(_side(place), before, now)
-    keys, ours = (
-        {str(one[:1]) for one in listed if isinstance(one, list)} for listed in (before, now)
-    )
+    keys, ours = _entries(before), _entries(now)
     return "loosened" if ours > keys else "tightened" if ours < keys else "changed"
+
+
+def _entries(listed: Any) -> set[str]:
+    """What an exception is for: its key, or the first item of an entry of a list."""
+    if isinstance(listed, dict):
+        return set(map(str, listed))
+    return {str(one[:1]) for one in listed if isinstance(one, list)}
 
 
 def _kind(comparison: str, before: object, now: object) -> Kind:
@@ -293,7 +200,9 @@ def _is_number(value: object) -> bool:
 
 def _of_section(place: str, kind: Kind) -> Kind:
     """Of a limit the kind; a setting that came or went has a default on no known side."""
-    return "changed" if place.partition(".")[0] in SECTIONS or place in IF_STATED else kind
+    section, _, name = place.partition(".")
+    free = section in SECTIONS or place in IF_STATED or name.startswith(f"{COSTS}.")
+    return "changed" if free else kind
 
 
 def _strict(place: str) -> str:
@@ -304,7 +213,13 @@ def _strict(place: str) -> str:
 def _all_settings(params: Mapping[str, Any]) -> dict[str, Any]:
     """Every setting of the sections that the plan names whole, by its place."""
     each = (_leaves(name, params.get(name, {})) for name in SECTIONS)
-    return {place: value for found in each for place, value in found.items()}
+    named = tuple(f"{place}." for place in STATED)
+    return {
+        place: value
+        for found in each
+        for place, value in found.items()
+        if not f"{place}.".startswith(named)
+    }
 
 
 def _leaves(place: str, value: Any) -> dict[str, Any]:
@@ -317,13 +232,12 @@ def _leaves(place: str, value: Any) -> dict[str, Any]:
 
 
 def _all_limits(params: Mapping[str, Any]) -> dict[str, Any]:
-    """Every limit of a criterion, and of the cause that Gate A judges by, by its place."""
+    """Every limit of a criterion, of the cause and each cost of a monitor, by its place."""
     found: dict[str, Any] = {}
     for name in map(stage_of, GATES):
-        stated = by_criterion(at(params, f"{name}.limits"))
-        found |= {f"{name}.{item}": value for item, value in stated.items()}
-        cause = by_criterion(at(params, f"{name}.{CAUSE}"))
-        found |= {f"{name}.{CAUSE}.{item}": value for item, value in cause.items()}
+        for part, before in (("limits", ""), (CAUSE, f"{CAUSE}."), (COSTS, f"{COSTS}.")):
+            stated = by_criterion(at(params, f"{name}.{part}"))
+            found |= {f"{name}.{before}{item}": value for item, value in stated.items()}
     return found
 
 

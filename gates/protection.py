@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from gates.floors import BOUNDS, Bound
-from gates.preregistration import CAUSE, at, by_criterion
+from gates.planned_settings import CAUSE
+from gates.preregistration import at, by_criterion
 from gates.report import Gate, stage_of
 from gates.settings import DERIVED, LIMITS, NOT_APPLICABLE
 from gates.severity import PLACE, too_mild

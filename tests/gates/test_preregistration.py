@@ -8,10 +8,9 @@ import yaml
 
 from gates.cause.limits import OWN
 from gates.may_differ import PLACE
+from gates.planned_settings import CAUSE_STRICT, PLANNED
 from gates.preregistration import (
-    CAUSE_STRICT,
     NONE,
-    PLANNED,
     PREREGISTRATION,
     Move,
     moved_caveats,

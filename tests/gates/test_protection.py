@@ -10,7 +10,7 @@ from flows.workspace import merged
 from gates.asked_for import CHECKS_ASKED_FOR, INCIDENTS_ASKED_FOR, OF_TWO
 from gates.floors import BOUNDS
 from gates.need.settings import NeedSettings
-from gates.preregistration import CAUSE
+from gates.planned_settings import CAUSE
 from gates.proof import SPECS, judge
 from gates.protection import (
     NAMED,
