@@ -71,6 +71,17 @@ def unsaid(evidence: Evidence, folder: str, method: str, *, one_mode: bool = Fal
     return sorted(key for key in {*own, *other} - known if own.get(key) != other.get(key))
 
 
+def compared(evidence: Evidence, folder: str, method: str) -> int:
+    """How many settings of a method and of the reference are held against each other.
+
+    Raises:
+        MissingEvidenceError: As `unsaid`.
+    """
+    said, entry = entry_of(evidence, folder, method)
+    _, reference = entry_of(evidence, folder, said.reference)
+    return len({*flat(entry.config, COUNTED), *flat(reference.config, COUNTED)} - {"method"})
+
+
 def otherwise(
     evidence: Evidence, folder: str, method: str, *, first: int, place: str | None = None
 ) -> list[str]:

@@ -60,7 +60,7 @@ def keygen(
     from pydantic import TypeAdapter, ValidationError
 
     from gates.card.key_files import make_key
-    from gates.card.people import ALLOW_LIST, PersonId
+    from gates.card.people import ALLOW_LIST, ROLES, PersonId
     from genpolicy.errors import ConfigError
 
     try:
@@ -77,7 +77,10 @@ def keygen(
     print(
         f"Your entry for {ALLOW_LIST}; you can sign once it is complete and committed, in review:"
     )
-    print(f"- id: {identifier}\n  name: \n  role: \n  public_key: {public}\n  emails: []")
+    roles = f"{', '.join(ROLES[:-1])} or {ROLES[-1]}"
+    print(
+        f"- id: {identifier}\n  name: \n  role:   # {roles}\n  public_key: {public}\n  emails: []"
+    )
     return 0
 
 

@@ -82,6 +82,7 @@ def _draw(axes: Axes, place: int, row: Mapping[str, Any], colour: str) -> None:
     axes.annotate(
         percent(value) if row["measure"] in SHARES else three(value), (row["effect"], place),
         xytext=(0, 5), textcoords="offset points", ha="center", fontsize=7, color=INK,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.85},
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.need.kept import coverage
 from gates.need.settings import AUDIT, MEASURED
 from gates.pages import plots_factors, plots_scene
 from gates.pages.figures import Photo, Plot, in_order
@@ -17,7 +18,7 @@ from genpolicy.audit.rows import ModeOutcome, ReplayRow, SituationRow, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.pages.figures import captions, checks, situations
-from genpolicy.pages.figures.drawing import BLUE, in_percent, new_figure
+from genpolicy.pages.figures.drawing import BLUE, INK, in_percent, new_figure
 
 EXAMPLES = f"{AUDIT}/examples.parquet"
 ALIGNMENT = f"{AUDIT}/alignment.parquet"
@@ -91,31 +92,35 @@ def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
 def _baselines(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(f"{MEASURED}/modes.parquet", ModeRow)
     frame = frame[numbers(frame, "modes_present") >= 2]
-    share = numbers(frame, "modes_valid") / numbers(frame, "modes_present")
-    means = (
-        frame.assign(share=share).groupby(["method", "convention"])["share"].agg(["mean", "size"])
-    )
+    own = {(str(m), str(c)): rows for (m, c), rows in frame.groupby(["method", "convention"])}
+    order = [key for name in in_order(frame["method"]) for key in own if key[0] == name]
     deployed = report.settings.get("deployed_conventions", [])
     generative = report.settings.get("generative_baselines", [])
-    order = [key for name in in_order(frame["method"]) for key in means.index if key[0] == name]
+    drawn = {key for key in order if key[1] not in deployed or key[0] in generative}
+    # As `baseline_mode_coverage` judges: as many chances to keep the modes as are deployed.
+    outside = 1.0 - float(report.settings["confidence"])
+    level = 1.0 - outside / max(len(order) - len(drawn), 1)
     figure, (axes,) = new_figure(height=1.0 + 0.3 * len(order))
-    for place, (method, convention) in enumerate(order):
-        drawn = convention not in deployed or method in generative
+    labels = []
+    for place, key in enumerate(order):
+        share, lower, upper = coverage(own[key], level)
         axes.barh(
             place,
-            float(means.loc[(method, convention), "mean"]),
-            color="white" if drawn else BLUE,
+            share,
+            color="white" if key in drawn else BLUE,
             edgecolor=BLUE,
-            hatch="//" if drawn else "",
+            hatch="//" if key in drawn else "",
             height=0.6,
         )
-    labels = [f"{m} · {c} (n = {int(means.loc[(m, c), 'size'])})" for m, c in order]
+        axes.hlines(place, lower, upper, color=INK, lw=1.5)
+        episodes = own[key]["episode_uuid"].nunique()
+        labels.append(f"{key[0]} · {key[1]} (n = {episodes})")
     axes.set_yticks(np.arange(len(order)), labels)
     axes.invert_yaxis()
     axes.set_xlim(0, 1.02)
     in_percent(axes.xaxis)
     draw_limit(axes, report, "baseline_mode_coverage")
-    axes.set_xlabel("mean share of modes covered, situations with two modes")
+    axes.set_xlabel("mean share of modes covered, situations with two modes; n episodes")
     return figure
 
 
@@ -163,9 +168,10 @@ PLOTS: tuple[Plot | Photo, ...] = (
     Plot(
         "Modes that the simple policies keep",
         "Share of the modes of a held-out situation that a policy's admissible samples reach. A "
-        "deterministic policy reaches one of two at most, which is 0.5; less means that it lands "
-        "between them or is refused. Judged is the best baseline as it is deployed (solid bars); "
-        "hatched bars draw at random, as a generator does.",
+        "deterministic policy reaches one of two at most, which is 50 %; less means that it lands "
+        "between them or is refused. Line: interval over episodes (n), its level divided among the "
+        "deployed conventions, as the gate judges. Judged is the upper end of the best baseline "
+        "as it is deployed (solid bars); hatched bars draw at random, as a generator does.",
         f"{MEASURED}/modes.parquet",
         _baselines,
     ),

@@ -114,6 +114,12 @@ def nonfinite_that_lie(evidence: Evidence, candidate: str) -> int:
     return sum(weights_at(evidence, f"{folder}/{WEIGHTS}").nonfinite for folder in folders)
 
 
+def weights_that_lie(evidence: Evidence, candidate: str) -> int:
+    """How many weights all trainings of a candidate have, where they lie; errors as above."""
+    folders = folders_of(evidence, candidate).values()
+    return sum(weights_at(evidence, f"{folder}/{WEIGHTS}").count for folder in folders)
+
+
 def require_by_definition(rows: pd.DataFrame, candidate: str, config: TrainedConfig) -> None:
     """Counts that are said to be allowed are those of the sampler that the checkpoint has.
 

@@ -1,10 +1,12 @@
 """Gate B, reproducibility: is a candidate pinned, and does it come back the same?"""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
 from gates.claim import CHECKPOINT_ONLY, trainings
-from gates.configured import unsaid
+from gates.configured import compared, unsaid
 from gates.criterion import Measured, criteria_of, criterion
 from gates.distilled import spent
 from gates.engine import GateSpec, Judged
@@ -13,7 +15,11 @@ from gates.may_differ import unmatched
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility import conformance, convergence, modes, timing, variations
 from gates.reproducibility.compute import cost_of, cost_said
-from gates.reproducibility.files import nonfinite_that_lie, require_by_definition
+from gates.reproducibility.files import (
+    nonfinite_that_lie,
+    require_by_definition,
+    weights_that_lie,
+)
 from gates.reproducibility.fixtures import require_as_trained
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.matching import matched_by
@@ -28,6 +34,7 @@ from gates.reproducibility.settings import (
     SAMPLES,
     ReproducibilitySettings,
 )
+from gates.words import number
 from genpolicy.evidence.documents.brought import FAULTS
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity
@@ -51,10 +58,11 @@ def unmatched_keys(
         )
         return Measured(1.0, caveat=text)
     found = unmatched(evidence, GENERATORS, (candidate,), settings.may_differ)
+    counted = f"all {compared(evidence, GENERATORS, candidate)} settings"
     if hidden := unsaid(evidence, GENERATORS, candidate):
         text = f"{', '.join(hidden)}: configured otherwise than the reference, and not listed"
-        return Measured((found.value or 0.0) + len(hidden), caveat=text)
-    return found
+        return Measured((found.value or 0.0) + len(hidden), caveat=text, counted=counted)
+    return replace(found, counted=counted)
 
 
 @criterion(
@@ -121,7 +129,8 @@ def nonfinite_weights(
         if entry.nonfinite_chunks:
             texts.append(_chunks_said(entry))
         most = max(lie, entry.nonfinite_weights) + entry.nonfinite_chunks
-        return Measured(float(most), caveat="; ".join(texts))
+        counted = f"all {number(weights_that_lie(evidence, candidate))} weights"
+        return Measured(float(most), caveat="; ".join(texts), counted=counted)
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
     return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from gates.card.commands import card
-from gates.card.people import Person
+from gates.card.people import ROLES, Person
 from gates.card.signing import read_draft
 from genpolicy.cli.shell import run_program
 from genpolicy.integrity.documents import canonical_json
@@ -47,6 +47,7 @@ def test_a_key_and_the_entry_that_names_it(run, tmp_path):
     code, out, _ = run("keygen", "--id", "rita", "--out", tmp_path / "rita.pem")
     assert code == 0
     [entry] = yaml.safe_load(out[out.index("- id:") :])
+    assert all(role in out for role in ROLES)  # nobody has to look up what to write there
     person = Person(**{**entry, "name": "Rita", "role": "reviewer", "emails": ()})
     assert person.key is not None
     assert "PRIVATE" not in out

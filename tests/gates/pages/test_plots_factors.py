@@ -21,6 +21,11 @@ def _effects(root, judged):
     ]
 
 
+def test_no_line_runs_through_a_number(whole, judged):
+    for axes in PLOTS[0].draw(Evidence(whole), judged("A")).axes:
+        assert axes.texts and all(text.get_bbox_patch() is not None for text in axes.texts)
+
+
 def test_every_effect_is_drawn_once_in_the_panel_of_its_measure(whole, judged):
     frame = Evidence(whole).rows(EFFECTS, EffectRow)
     for drawn, (measures, _) in zip(_effects(whole, judged), PANELS, strict=True):

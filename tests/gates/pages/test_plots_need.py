@@ -1,6 +1,7 @@
 """Figures of Gate A: drawn by the level and the confidence that it was judged by."""
 
 import evidence
+import numpy as np
 from otherwise import judged_by_others, without_confidence
 
 from gates.evidence import Evidence
@@ -24,7 +25,7 @@ def test_they_are_drawn_by_the_level_and_confidence_judged_by(copied):
 
 
 def test_without_the_confidence_judged_by_no_interval_is_drawn(whole, judged):
-    assert without_confidence(whole, judged("A"), PLOTS) == ["'confidence'"]
+    assert without_confidence(whole, judged("A"), PLOTS) == ["'confidence'"] * 2
 
 
 def test_only_what_is_deployed_and_draws_nothing_at_random_is_solid(copied, judged):
@@ -43,6 +44,17 @@ def test_only_what_is_deployed_and_draws_nothing_at_random_is_solid(copied, judg
         and name.split(" · ")[0] not in report.settings["generative_baselines"]
     }  # fmt: skip
     assert solid == expected and 0 < len(solid) < len(names)
+
+
+def test_a_bar_has_the_interval_over_episodes_by_which_the_best_is_judged(copied, judged):
+    report = judged("A")
+    (axes,) = BASELINES.draw(Evidence(copied), report).axes
+    (answer,) = [item for item in report.criteria if item.id == "baseline_mode_coverage"]
+    ends = [tuple(line[:, 0]) for each in axes.collections for line in each.get_segments()]
+    assert len(ends) == len(axes.patches)
+    assert any(np.allclose(end, answer.interval) for end in ends)
+    for bar, (lower, upper) in zip(axes.patches, ends, strict=True):
+        assert lower <= bar.get_width() <= upper and upper - lower > 0.01
 
 
 def test_a_bar_is_the_mean_share_over_situations_with_several_modes(copied, judged):

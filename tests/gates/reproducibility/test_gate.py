@@ -6,8 +6,9 @@ import pytest
 from asked import asked, found_in, red
 from editing import cells
 
-from gates.evidence import MissingEvidenceError
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
+from gates.reproducibility.files import WEIGHTS, folders_of
 from gates.reproducibility.gate import (
     nfe_mismatch,
     nonfinite_weights,
@@ -15,6 +16,8 @@ from gates.reproducibility.gate import (
     samples_difference,
     unpinned_items,
 )
+from gates.reproducibility.weights import weights_at
+from gates.words import number
 from genpolicy.policies.settings import SamplerConfig
 
 MODES = "reload/modes.parquet"
@@ -247,6 +250,14 @@ def test_on_another_device_both_comparisons_are_asked_for(ladder, rows, expected
     assert found.verdict == expected[0] and expected[1] in found.caveat
     pinned = answer_of(ladder, "unpinned_items")
     assert pinned.verdict == "FAIL" and "ran on cpu, compute.device is cuda" in pinned.caveat
+
+
+def test_of_how_many_weights_none_may_be_no_number(ladder):
+    held = Evidence(ladder)
+    folders = folders_of(held, "flow").values()
+    weights = sum(weights_at(held, f"{folder}/{WEIGHTS}").count for folder in folders)
+    counted = answer_of(ladder, "nonfinite_weights").counted
+    assert weights > 0 and counted == f"all {number(weights)} weights"
 
 
 def test_chunks_of_its_own_sampler_that_are_no_numbers_fail_a_candidate(ladder):

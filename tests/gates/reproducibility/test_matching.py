@@ -125,6 +125,17 @@ def test_a_setting_that_differs_and_is_not_listed_counts_by_name(ladder, part, k
     assert found.value >= 1 and f"{part}.{key}" in found.caveat
 
 
+def test_it_says_how_many_settings_were_compared_of_either_side(ladder):
+    def counted(change):
+        return int(_configured(ladder, change).counted.removeprefix("all ").split()[0])
+
+    before = counted(lambda d, own: None)
+    assert counted(lambda d, own: own["horizons"].update(one_more=1)) == before + 1
+    # What only the reference has is compared as well, and what training counts is no setting.
+    assert counted(lambda d, own: own["horizons"].clear()) == before
+    assert counted(lambda d, own: own["parameters"].update(one_more=1)) == before
+
+
 def test_what_is_so_by_definition_or_a_count_is_no_setting_that_differs(ladder):
     def change(document, own):
         own["parameters"]["head"] = 11
