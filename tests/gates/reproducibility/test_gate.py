@@ -6,6 +6,7 @@ import pytest
 from asked import asked, found_in, red
 from editing import cells
 
+from gates import words
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
 from gates.reproducibility.files import WEIGHTS, folders_of
@@ -17,7 +18,6 @@ from gates.reproducibility.gate import (
     unpinned_items,
 )
 from gates.reproducibility.weights import weights_at
-from gates.words import number
 from genpolicy.policies.settings import SamplerConfig
 
 MODES = "reload/modes.parquet"
@@ -257,7 +257,7 @@ def test_of_how_many_weights_none_may_be_no_number(ladder):
     folders = folders_of(held, "flow").values()
     weights = sum(weights_at(held, f"{folder}/{WEIGHTS}").count for folder in folders)
     counted = answer_of(ladder, "nonfinite_weights").counted
-    assert weights > 0 and counted == f"all {number(weights)} weights"
+    assert weights > 0 and counted == f"all {words.number(weights)} weights"
 
 
 def test_chunks_of_its_own_sampler_that_are_no_numbers_fail_a_candidate(ladder):
