@@ -10,7 +10,7 @@ from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.moment import MODE_OF_SOURCE, Chunk, Moment, View
-from genpolicy.execution.nanoseconds import ChunkTimes
+from genpolicy.execution.nanoseconds import ChunkTimes, to_ns
 from genpolicy.execution.scene import read_scene
 
 if TYPE_CHECKING:
@@ -32,8 +32,9 @@ def shape_of(admitted: "Admitted") -> tuple[int, str]:
 
 def named_in(metadata: object) -> str:
     """Name of the chunk that metadata are of, malformed things included."""
-    named = type(metadata) is ChunkMetadata and type(metadata.chunk_id) is str
-    return metadata.chunk_id if named else MALFORMED  # type: ignore[attr-defined]
+    # One that nobody has built to its end has no fields at all.
+    named = getattr(metadata, "chunk_id", None) if type(metadata) is ChunkMetadata else None
+    return named if type(named) is str else MALFORMED
 
 
 def read_chunk(admitted: "Admitted", *, arrival: int, source: str) -> Chunk | None:
@@ -59,6 +60,7 @@ def read_chunk(admitted: "Admitted", *, arrival: int, source: str) -> Chunk | No
             passed=passed and bool(np.isfinite(actions).all()),
             hashed=actions_sha256(actions) == admitted.actions_sha256,
             scene=read_scene(admitted.context.scene.bodies),
+            measured_ns=to_ns(admitted.context.measured_at_s),
         )
     except Exception:  # of whatever it is, reading it may raise anything
         return None

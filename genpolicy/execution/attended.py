@@ -9,6 +9,7 @@ from genpolicy.contract.names import says
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import ExecutorMode
+from genpolicy.execution.observed import name_of
 
 
 class AttendedExecutor(Executor):
@@ -28,10 +29,10 @@ class AttendedExecutor(Executor):
         """
         now_ns = self._begin(now_s)
         called = self.mode is ExecutorMode.INTERVENTION
-        if not called or self.stub.supervisor.stopped or not says(person):
+        if not called or self.stub.supervisor.stopped or not says(name_of(person)):
             return False
-        self.person = person
-        self._journal.add("person", now_ns, {"stage": "took_over", "who": person})
+        self.person = name_of(person)
+        self._journal.add("person", now_ns, {"stage": "took_over", "who": self.person})
         self._enter(now_ns, ExecutorMode.FALLBACK)
         return True
 

@@ -149,7 +149,7 @@ def _least_behind(times: ChunkTimes, condition_ns: int | None, start_ns: int | N
 
 def _maker_is(m: Moment, field_name: str, active: str) -> bool:
     expected = m.view.fallback if m.chunk.source == FALLBACK else active
-    return bool(getattr(m.chunk.metadata, field_name) == expected)
+    return bool(expected) and getattr(m.chunk.metadata, field_name) == expected
 
 
 def _not_superseded(m: Moment) -> bool:
@@ -202,7 +202,9 @@ def _after(reason: DiscardReason) -> Callable[[Moment], bool]:
         if event is None:
             return True
         chunk = m.chunk
-        return chunk.times.condition_ns - event.before_ns >= 0 and chunk.arrival >= event.arrivals
+        # A plan on a new image that was checked from where the arm stood before is one from before.
+        seen_ns = min(chunk.times.condition_ns, chunk.measured_ns)
+        return seen_ns - event.before_ns >= 0 and chunk.arrival >= event.arrivals
 
     return holds
 

@@ -137,12 +137,18 @@ class Informed(ABC):
         self._invalidate(now_ns, now_ns, DiscardReason.COLLISION_EVENT)
 
     def set_active(self, now_s: float, checkpoint_hash: str, sampler_hash: str) -> None:
-        """Name the weights and the sampler that may command; what others made is discarded."""
-        now_ns = self._begin(now_s)
-        payload = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
-        self._journal.add("active", now_ns, payload)
-        self.stub.note_active(checkpoint_hash, sampler_hash)
-        self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
+        """Name the weights and the sampler that may command; what others made is discarded.
+
+        What is no name names none, of which nothing may command.
+        """
+        now_ns, checkpoint, sampler = (
+            self._begin(now_s),
+            name_of(checkpoint_hash),
+            name_of(sampler_hash),
+        )
+        self._journal.add("active", now_ns, {"checkpoint": checkpoint, "sampler": sampler})
+        self.stub.note_active(checkpoint, sampler)
+        self._view = replace(self._view, checkpoint=checkpoint, sampler=sampler)
         self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
         self._drop(now_ns, DiscardReason.SAMPLER_MISMATCH)
 

@@ -33,7 +33,8 @@ class Voiding(NamedTuple):
     """An event after which nothing from before it may be used.
 
     Attributes:
-        before_ns: What was conditioned before this time is void.
+        before_ns: What was conditioned before this time is void, and so is what was checked from
+            joints that were measured before it.
         arrivals: What arrived with a smaller number is void too; it was there at the event.
     """
 
@@ -119,6 +120,8 @@ class Chunk:
         passed: All six layers passed and all actions are finite.
         hashed: The actions have the hash that was taken when they passed.
         scene: Where bodies stood when it was checked; None where it does not say.
+        measured_ns: When the joints were measured that it was checked from; before everything
+            where it does not say.
     """
 
     metadata: ChunkMetadata
@@ -130,6 +133,7 @@ class Chunk:
     passed: bool = False
     hashed: bool = False
     scene: Scene | None = None
+    measured_ns: int = NEVER_NS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -61,11 +61,14 @@ def distance_of(value: object) -> float | None:
         return None
     try:
         told_m = float(value) if isinstance(value, Real) else math.nan
-    except OverflowError:
+    except Exception:  # of whatever it is, reading it may raise anything
         return FARTHEST_M
     return told_m if 0.0 <= told_m <= FARTHEST_M else FARTHEST_M
 
 
 def name_of(value: object) -> str:
-    """A name, as it is; what is none names nothing."""
-    return value if isinstance(value, str) else ""
+    """A name, as it is and as a plain text; what is none, or cannot be read, names nothing."""
+    try:
+        return str.__str__(value) if isinstance(value, str) else ""
+    except Exception:  # of whatever it is, asking what it is may raise anything
+        return ""

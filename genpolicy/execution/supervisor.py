@@ -21,6 +21,7 @@ from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.moment import Moment
 from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.execution.observed import name_of
 
 
 class SupervisorState(StrEnum):
@@ -98,8 +99,7 @@ class Supervisor:
         return True
 
     def _bears_n(self, phase: str) -> float:
-        limits = self.settings.force_limit_n
-        return limits.get(phase, 0.0) if isinstance(phase, str) else 0.0
+        return self.settings.force_limit_n.get(name_of(phase), 0.0)
 
     def observe_collision(self, now_s: float, collision: bool) -> bool:
         """Collision gate; trips a protective stop, unless told that there is none.

@@ -154,17 +154,21 @@ class WorldView:
         shift_m = moved_m(chunk["motion"]["scene"], self.scene) if chunk["motion"] else 0.0
         if not shift_m <= settings["maximum_scene_shift_m"]:
             yield "P1.scene", f"A body has moved by {shift_m:.3g} m since the chunk was checked."
-        yield from self._voided(seen_ns, chunk["arrival"])
+        yield from self._voided(chunk)
 
     def _unheard(self) -> Iterator[Finding]:
         """A force beyond what the phase bears, of which nobody heard: it goes on, or ends well."""
         if not self._felt_n <= self._most_n + ROUNDING_N:
             yield "P7.force", f"{self._felt_n} N are measured, the phase bears {self._most_n} N."
 
-    def _voided(self, seen_ns: int, arrival: int) -> Iterator[Finding]:
+    def _voided(self, chunk: Message) -> Iterator[Finding]:
+        seen_ns, arrival, motion = chunk["condition_ns"], chunk["arrival"], chunk["motion"]
+        measured_ns = motion["measured_ns"] if motion else seen_ns
         for cause, before_ns in self.void_before.items():
             if seen_ns < before_ns:
                 yield "P1.void", f"{cause} at {before_ns} ns voids an observation of {seen_ns} ns."
+            elif measured_ns < before_ns:
+                yield "P1.void", f"{cause} at {before_ns} ns voids joints of {measured_ns} ns."
             # What is as new as the event is void all the same if it was here when it happened.
             elif arrival < self._void_arrivals[cause]:
                 yield "P1.void", f"{cause} at {before_ns} ns voids what had arrived, as {arrival}."

@@ -221,7 +221,8 @@ class Rig:
     def context(self) -> StandInContext:
         """What an honest chunk would have been checked against now: last command and scene."""
         commanded = self.journal.last("accept", "fallback")
-        seen = StandInContext(scene=StandInScene(dict(self.poses)))
+        scene = StandInScene(dict(self.poses))
+        seen = StandInContext(scene=scene, measured_at_s=self.now_s)
         if commanded is None:
             return seen
         return replace(seen, last_action=decode_actions(commanded["action"])[0])
