@@ -17,7 +17,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import FITTING, DeadlineAction, Term, TermDeadline
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
-from genpolicy.execution.moment import View
+from genpolicy.execution.moment import Position, View
 from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.robot.controller import CONTROLLER_MODE
 
@@ -199,7 +199,9 @@ class Cell:
             for phase, what in self.execution.late_by_phase.items()
         }
 
-    def view_after(self, view: View, *, event_ns: int, phase: str, epoch: str) -> View:
+    def view_after(
+        self, view: View, *, event_ns: int, phase: str, epoch: str, tcp_m: Position | None
+    ) -> View:
         """A view of the present after an observation; a phase without limits allows nothing."""
         return replace(
             view,
@@ -208,6 +210,7 @@ class Cell:
             calibration_epoch=epoch,
             maximum_age_ns=self.maximum_age_ns.get(phase),
             latest_first_row=self.latest_first_row.get(phase),
+            tcp_m=tcp_m,
         )
 
     def require_task(self, phases: Iterable[str]) -> None:

@@ -168,7 +168,7 @@ class ChunkQueue:
             newer_start_ns=newer_start_ns, last_due_ns=self.last_due_ns,
             last_accept_ns=self.continuity.given_ns,
             follows=self.continuity.follows(
-                chunk.admitted, chunk.about, chunk.next_row, now_ns
+                chunk.admitted, chunk.about, chunk.next_row, now_ns, view
             ),
         )  # fmt: skip
         check = refusal(self._checks, place, moment)

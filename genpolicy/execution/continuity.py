@@ -2,8 +2,9 @@
 
 It checked the ways between the rows of a chunk, and the one from the last command of its own
 moment to the first row that it was asked about. After a row that was left out, another command in
-between, or a hold, nobody has checked anything, and the chunk needs a new admission. Executor and
-controller stub each keep their own.
+between, or a hold, nobody has checked anything, and the chunk needs a new admission. Where no
+command says where the arm is (in a new session, after a person, a stop or a reset), the chunk was
+checked from where it is seen. Executor and controller stub each keep their own.
 
 A hold is half a period more than the one that a command lasts, by the clock; and one by the
 watchdog, or for a clock that is doubted, however short, since that clock measured nothing. A loop
@@ -15,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.execution.moment import Chunk
+from genpolicy.contract.action import POSITION
+from genpolicy.execution.moment import Chunk, View
 from genpolicy.execution.nanoseconds import NEVER_NS
 
 if TYPE_CHECKING:
@@ -79,7 +81,7 @@ class Continuity:
             self._resumed_ns = resumed_ns
             self.forget()
 
-    def follows(self, chunk: "Admitted", about: Chunk, row: int, now_ns: int) -> bool:
+    def follows(self, chunk: "Admitted", about: Chunk, row: int, now_ns: int, view: View) -> bool:
         """Whether feasibility checked the way from the last command to a row.
 
         Args:
@@ -87,15 +89,16 @@ class Continuity:
             about: What is known of the chunk.
             row: The row.
             now_ns: Time.
+            view: The present; where the arm was seen last.
         """
         last, holds = self._last, self._holds(now_ns, about.times.period_ns)
         if last is not None and last.chunk is chunk:
             return row == last.row + 1 and holds == 0
         if row != about.checked_rows[0]:
             return False
-        if last is None:
-            return True
         context = getattr(chunk, "context", None)
+        if last is None:
+            return begins_here(context, view)
         told = bytes_of(getattr(context, "last_action", None))
         before = self._commands - 1 + holds
         return told == last.action and rests(context, holds) and knows(context, before)
@@ -106,6 +109,20 @@ class Continuity:
             return 0
         held = self._held_ns is not None and self._held_ns < now_ns
         return max(round((now_ns - self.given_ns) / period_ns) - 1, int(held))
+
+
+def begins_here(context: object, view: View) -> bool:
+    """Whether a chunk was checked from where the arm is seen, as far as it may be off a command.
+
+    Asked where no command says where it is. Where nobody says where it was seen, or the chunk does
+    not say from where it was checked, nobody knows.
+    """
+    try:
+        told = np.asarray(getattr(context, "last_action", None), dtype=float)[POSITION]
+        away_m = float(np.linalg.norm(told - np.asarray(view.tcp_m, dtype=float)))
+    except (TypeError, ValueError, IndexError):
+        return False
+    return away_m <= view.divergence_limit_m
 
 
 def rests(context: object, holds: int) -> bool:

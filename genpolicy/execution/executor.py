@@ -65,7 +65,9 @@ class Executor(Informed):
         now_ns = self._begin(now_s)
         epoch = self._view.session_epoch + 1
         self._journal.add("reset", now_ns, {"session_epoch": epoch})
-        self._view = replace(self._view, session_epoch=epoch, newest_observation_ns=None)
+        self._view = replace(
+            self._view, session_epoch=epoch, newest_observation_ns=None, tcp_m=None
+        )
         self._void(now_ns, DiscardReason.RESET, now_ns)
         self._in_flight.clear()
         self._queue.forget()

@@ -67,6 +67,8 @@ class Informed(ABC):
         phase: str,
         calibration_epoch: str,
         divergence_m: float | None = None,
+        *,
+        tcp_m: ArrayLike | None = None,
     ) -> bool:
         """Whether an observation is used; one older than the newest is ignored and counted.
 
@@ -76,13 +78,19 @@ class Informed(ABC):
             phase: Task phase.
             calibration_epoch: Calibration of its sensors.
             divergence_m: Distance of measured from commanded TCP, if known, m.
+            tcp_m: Where the TCP was measured, if known, m. Where no command says where the arm is
+                (a session begins, a person had it, a stop was cleared), nothing moves that was not
+                checked from there. Shape (3,).
         """
         now_ns = self._begin(now_s)
-        told = Observed.of(self._view, now_ns, event_time_s, phase, calibration_epoch, divergence_m)
+        told = Observed.of(
+            self._view, now_ns, event_time_s, phase, calibration_epoch, divergence_m, tcp_m
+        )
         self._journal.add("observation", now_ns, told.payload())
         self.stub.note_observation(
-            now_ns, told.event_ns, told.phase, told.calibration_epoch, told.divergence_m
-        )
+            now_ns, told.event_ns, told.phase, told.calibration_epoch, told.divergence_m,
+            tcp_m=told.tcp_m,
+        )  # fmt: skip
         if told.ignored:
             self.observations_ignored += 1
         else:
@@ -98,8 +106,9 @@ class Informed(ABC):
         """The view after an observation; another phase or calibration voids what is here."""
         before, event_ns = self._view, told.event_ns
         self._view = self.cell.view_after(
-            before, event_ns=event_ns, phase=told.phase, epoch=told.calibration_epoch
-        )
+            before, event_ns=event_ns, phase=told.phase, epoch=told.calibration_epoch,
+            tcp_m=told.tcp_m,
+        )  # fmt: skip
         for kind, old, new, reason in (
             ("phase", before.phase, told.phase, DiscardReason.PHASE_TRANSITION),
             ("epoch", before.calibration_epoch, told.calibration_epoch,

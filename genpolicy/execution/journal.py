@@ -32,7 +32,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 11
+JOURNAL_VERSION = 12
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in such a piece
 
@@ -42,7 +42,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
                 "fallback_hash", "controller_mode", "maximum_divergence_m",
                 "maximum_scene_shift_m", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because",
-                    "divergence_m"),
+                    "divergence_m", "tcp_m"),
     "scene": ("bodies",),
     "state": ("q_rad", "tcp_m", "tcp_rotation", "gripper_m", "force_n"),
     "exposure": ("sha256",),

@@ -12,6 +12,7 @@ from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
 from genpolicy.execution.scene import Scene
 
+Position = tuple[float, float, float]
 POLICY = "policy"
 FALLBACK = "fallback"
 
@@ -67,6 +68,7 @@ class View:
         divergence_limit_m: Measured from commanded TCP, beyond which chunks are void.
         scene: Where bodies were seen last; None until somebody says, and where it cannot be read.
         scene_limit_m: How far they may stand from where a chunk was checked with them.
+        tcp_m: Where the newest observation measured the TCP, m; None where it does not say.
     """
 
     phase: str = ""
@@ -88,6 +90,7 @@ class View:
     divergence_limit_m: float = 0.0
     scene: Scene | None = None
     scene_limit_m: float = 0.0
+    tcp_m: Position | None = None
 
     def ignores(self, event_ns: int, now_ns: int) -> str:
         """Why an observation of this event time is not used now; empty where it is.
@@ -162,7 +165,8 @@ class Moment:
         sequence: Number of the offer.
         last_sequence: Number of the offer accepted last.
         last_accept_ns: When an action was accepted last; None before the first.
-        follows: The way from the last command to this row is one that feasibility checked.
+        follows: The way from the last command to this row is one that feasibility checked; where no
+            command says where the arm is, the way from where it was seen.
         watchdog_ns: Longest silence.
         divergence_m: What an observation says that the measured TCP is off the commanded one; None
             where it does not say, as of a replay without an arm.

@@ -21,7 +21,7 @@ from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.continuity import Continuity, bytes_of
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
-from genpolicy.execution.moment import ExecutorMode, Moment, View
+from genpolicy.execution.moment import ExecutorMode, Moment, Position, View
 from genpolicy.execution.scene import Scene
 from genpolicy.execution.supervisor import Supervisor
 
@@ -76,6 +76,8 @@ class ControllerStub:
         phase: str,
         calibration_epoch: str,
         divergence_m: float | None = None,
+        *,
+        tcp_m: Position | None = None,
     ) -> None:
         """Its own view of phase, calibration and newest observation, and of where the arm is."""
         old, seen_ns = self._view, self._view.newest_observation_ns
@@ -90,7 +92,7 @@ class ControllerStub:
         if old.calibration_epoch != calibration_epoch and seen_ns is not None:
             self.void(DiscardReason.CALIBRATION_MISMATCH, event_ns)
         self._view = self._cell.view_after(
-            self._view, event_ns=event_ns, phase=phase, epoch=calibration_epoch
+            self._view, event_ns=event_ns, phase=phase, epoch=calibration_epoch, tcp_m=tcp_m
         )
 
     def note_scene(self, scene: Scene | None) -> None:
@@ -113,7 +115,9 @@ class ControllerStub:
 
     def note_reset(self, now_ns: int, session_epoch: int) -> None:
         """A new session: nothing from before is accepted."""
-        self._view = replace(self._view, session_epoch=session_epoch, newest_observation_ns=None)
+        self._view = replace(
+            self._view, session_epoch=session_epoch, newest_observation_ns=None, tcp_m=None
+        )
         self._last_due_ns = None
         self._continuity.forget()
         self.void(DiscardReason.RESET, now_ns)
@@ -180,7 +184,7 @@ class ControllerStub:
             row=row,
             issued=issued_by_feasibility(admitted),
             same_action=_is_row(admitted, action, row),
-            follows=self._continuity.follows(admitted, about, row, now_ns),
+            follows=self._continuity.follows(admitted, about, row, now_ns, self._view),
             last_due_ns=self._last_due_ns,
             last_accept_ns=self._continuity.given_ns,
             sequence=sequence,

@@ -4,8 +4,8 @@ It shares no code with the executor, the stub or feasibility, and believes nothi
 about freshness: phase, calibration, newest observation, voiding events and stops are followed
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
-MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible (of a blend by its own admission, `joined`), P7 stop is sticky (`silence` is one), P8 a
+MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first, P6
+feasible (of a blend by its own admission, `joined`), P7 stop is sticky (`silence` is one), P8 a
 person has the arm (`attended`), `clock` (no answer before its time), `sensor` (nothing seen before
 it arrived), `state` (what was measured), `conservation`, `journal` (form), `settings` (limits).
 """
@@ -94,8 +94,7 @@ class _Session:
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.head: tuple[int, str] | None = None
-        self.n, self.t = -1, NEVER_NS
-        self.ended, self.last_sequence = False, -1
+        self.n, self.t, self.ended, self.last_sequence = -1, NEVER_NS, False, -1
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
         self.last_row: dict[int, int] = {}
@@ -159,6 +158,7 @@ class _Session:
                 self.flag("conservation", sentence)
         else:
             self._flag_all(self.world.follow(kind, m, self.balance.generated_chunks))
+            self.continuity.see(kind, m)
             if kind == "supervisor" and self.world.stopped:
                 self._answered(self.t)
                 self.unanswered_ns = None
@@ -172,7 +172,7 @@ class _Session:
         if self.proof is not None:
             self.proof.forget(self.name)
         if kind == "reset" or "intervention" in (m["old"], m["new"]):
-            self.continuity.forget()
+            self.continuity.forget(blind=kind == "reset")
         if kind == "reset":
             self.head = self.last_due_ns = self.last_start_ns = None
 
@@ -210,7 +210,7 @@ class _Session:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_begin(row, m)
         self._check_order(chunk, row, m)
-        self._flag_all(self.continuity.follow(chunk, m, self.settings["period_ns"]))
+        self._flag_all(self.continuity.follow(chunk, m, self.settings))
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:

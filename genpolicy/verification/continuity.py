@@ -5,6 +5,10 @@ the controller was given must go that way, whatever the clock says. Where the ro
 joints that a chunk says were commanded must be those commands: speed, acceleration and jerk of its
 first rows were checked from these joints, and from none that it leaves out.
 
+Where no command says where the arm is (a session begins, a person had it, a stop was cleared, a
+reset), the chunk must have been checked from where the newest observation measured the TCP, as
+near as the arm may otherwise be to a command. Where none says, nobody knows.
+
 After a hold the arm stands, and what goes on from there was checked from rest, never as the rest of
 a chunk. It was held where half a period or more is missing between two actions, and where the
 journal says that the watchdog held before the second one, or that a clock was doubted: how long
@@ -26,7 +30,7 @@ from genpolicy.verification.motion import POSE_TOLERANCE_M, POSE_TOLERANCE_RAD, 
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
-RULE, PACE, COMMANDS = "P5.continuity", "P5.pace", "P6.commands"
+RULE, PACE, COMMANDS, HERE = "P5.continuity", "P5.pace", "P6.commands", "P5.here"
 LATE, DUE = 3, 2
 """Two actions three halves of a period apart, or further, have a hold between them."""
 DOUBTED = ("no_time", "clock_backwards", "clock_ahead")
@@ -47,11 +51,23 @@ class Continuity:
         self._accepted_ns: int | None = None
         self._since_ns: list[int] = []
         self._given: deque[tuple[int, Array, Array]] = deque(maxlen=REMEMBERED)
+        self._seen_m: list[float] = []
 
-    def forget(self) -> None:
-        """Somebody else moves the arm, or has: no command says where it is."""
+    def see(self, kind: str, m: Message) -> None:
+        """Take in where an observation that is used measured the TCP."""
+        if kind == "observation" and m["used"]:
+            self._seen_m = m["tcp_m"]
+
+    def forget(self, *, blind: bool = False) -> None:
+        """Somebody else moves the arm, or has: no command says where it is.
+
+        Args:
+            blind: Nor does what was observed, of another session.
+        """
         self._last = None
         self._given.clear()
+        if blind:
+            self._seen_m = []
 
     def hold(self, m: Message) -> None:
         """Take in that the controller held."""
@@ -60,9 +76,10 @@ class Continuity:
         elif m["reason"] == "watchdog":
             self._since_ns.append(m["t"])
 
-    def follow(self, chunk: Message, m: Message, period_ns: int) -> Iterator[Finding]:
+    def follow(self, chunk: Message, m: Message, settings: Message) -> Iterator[Finding]:
         """Take an accepted action of a chunk in; yields what nobody checked about it."""
         last, motion, row = self._last, chunk["motion"], m["row"]
+        period_ns = settings["period_ns"]
         stood = any(at_ns < m["t"] for at_ns in self._since_ns)
         self._since_ns.clear()
         if last is not None and last[0] == m["arrival"]:
@@ -72,8 +89,8 @@ class Continuity:
                 yield RULE, f"Row {row} of {chunk['chunk_id']!r} goes on after a hold."
         elif row != chunk["checked_rows"][0]:
             yield RULE, f"Row {row} comes first, and is not the first that was checked."
-        elif last is not None and motion is not None and motion["last_action"] != last[2]:
-            yield RULE, f"{chunk['chunk_id']!r} was checked from another command."
+        elif motion is not None:
+            yield from self._begins(chunk, last, settings["maximum_divergence_m"])
         since_ns = self._accepted_ns
         if last is not None and last[0] != m["arrival"] and motion is not None:
             holds = max(round((m["t"] - (since_ns or 0)) / period_ns) - 1, int(stood))
@@ -94,6 +111,23 @@ class Continuity:
         if first <= row < behind:  # else another one (P1.checked_rows)
             q_rad = path.reshape(-1, joints)[row - first]
             self._given.append((m["t"], floats(m["action"]), q_rad))
+
+    def _begins(
+        self, chunk: Message, last: tuple[int, int, str] | None, limit_m: float
+    ) -> Iterator[Finding]:
+        """Whether it was checked from the last command; without one, from where the arm is seen."""
+        told = chunk["motion"]["last_action"]
+        if last is not None:
+            if told != last[2]:
+                yield RULE, f"{chunk['chunk_id']!r} was checked from another command."
+            return
+        told_m = floats(told)[POSITION]
+        if len(self._seen_m) != len(told_m):
+            yield HERE, f"{chunk['chunk_id']!r} goes on from where nobody says that the arm is."
+            return
+        away_m = float(np.linalg.norm(told_m - np.array(self._seen_m)))
+        if not away_m <= limit_m:
+            yield HERE, f"{chunk['chunk_id']!r} was checked {away_m:.3g} m from the arm."
 
     def _from_commands(
         self, chunk: Message, now_ns: int, period_ns: int, *, held: bool

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-ALWAYS = {"version": 11, "fallback_hash": "classical-fallback"}
+ALWAYS = {"version": 12, "fallback_hash": "classical-fallback"}
 """What every session declares: the journal that is read here, since in another one the same words
 may mean something else, and who makes the fallback's chunks, since nobody else commands as such."""
 

@@ -84,6 +84,7 @@ class Measured:
             yield from self._seen(m)
         elif kind == "observation":
             yield from self._diverged(m)
+            yield from self._located(m)
 
     def _take(self, kind: str, m: Message) -> None:
         """What others hold to account, and states are held against."""
@@ -143,6 +144,12 @@ class Measured:
         told_m = m["divergence_m"]
         if told_m is None or not abs(told_m - own_m) <= 2 * ROUNDING:
             yield "state.divergence", f"The arm is {own_m:.6g} m off, {told_m} m are noted."
+
+    def _located(self, m: Message) -> Iterator[Finding]:
+        """Where an observation says that the TCP is, the state has it."""
+        state = self._states.get(m["t"])
+        if state is not None and not _same(state.pose[POSITION], np.array(m["tcp_m"], dtype=float)):
+            yield "state.place", f"An observation has the TCP at {m['tcp_m']}."
 
     def _checked_from(self, m: Message) -> Iterator[Finding]:
         motion = m["motion"]

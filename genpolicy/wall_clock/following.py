@@ -7,12 +7,13 @@ arm stands where the window begins. A task whose `action_at` is no selection of 
 followed: its arm is the recorded one, and the operator's commands lead it.
 """
 
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import ACTION_DIM
+from genpolicy.contract.action import ACTION_DIM, POSITION
 from genpolicy.evidence.admission_context import COMMANDS_AT_THE_BOUNDARY
 from genpolicy.execution.command import Command
 from genpolicy.feasibility.admission import Admitted
@@ -34,6 +35,10 @@ class Arm(Protocol):
 
     def at(self, row: int) -> Array:
         """What is observed at a row. Shape (D_o,)."""
+        ...
+
+    def tcp_m(self, row: int) -> Array | None:
+        """Where the TCP is seen at a row, m; None where nobody can tell. Shape (3,)."""
         ...
 
     def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
@@ -76,7 +81,7 @@ def arm_of(task: Task, replay: Replay, *, horizon: int) -> Arm:
     """
     columns = pose_columns(task)
     if columns is None:
-        return RecordedArm(replay)
+        return RecordedArm(task, replay)
     return FollowingArm(task, replay, columns, horizon=horizon)
 
 
@@ -113,13 +118,20 @@ class RecordedArm:
 
     follows = False
 
-    def __init__(self, replay: Replay) -> None:
-        self._replay = replay
+    def __init__(self, task: Task, replay: Replay) -> None:
+        self._task, self._replay = task, replay
 
     def at(self, row: int) -> Array:
         """As recorded."""
         seen: Array = self._replay.observation_rows[row]
         return seen
+
+    def tcp_m(self, row: int) -> Array | None:
+        """As the task reads what was recorded."""
+        with suppress(Exception):  # whatever a task raises, the tick goes on to what stops
+            found: Array = np.asarray(self._task.action_at(self.at(row)))[POSITION]
+            return found
+        return None
 
     def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
         """As recorded."""
@@ -161,6 +173,10 @@ class FollowingArm:
     def at(self, row: int) -> Array:
         """What was recorded, with the arm where it is."""
         return place(self._replay.observation_rows[row], self._pose(row), self._columns)
+
+    def tcp_m(self, row: int) -> Array | None:
+        """Where it was commanded to one period before."""
+        return self._pose(row)[POSITION]
 
     def history(self, row: int, horizon: int, *, scene: int | None = None) -> Array:
         """What was recorded, with the arm where it was at each of these rows."""

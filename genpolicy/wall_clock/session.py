@@ -96,7 +96,7 @@ class SupervisedSession:
         self._row, replay, executor = row, self.replay, self.executor
         self.arm.reach(row)
         phase = replay.phases[row]
-        executor.observe(now_s, now_s, phase, replay.calibration_epoch)
+        executor.observe(now_s, now_s, phase, replay.calibration_epoch, tcp_m=self.arm.tcp_m(row))
         if self.stub.supervisor.observe_force(now_s, replay.forces_n[row], phase):
             executor.force_event(now_s)
         self._see(now_s, row)
@@ -123,7 +123,8 @@ class SupervisedSession:
         phase, start_s = replay.phases[row], row * horizons.action_period_s
         if self._asks and not self.arm.follows:  # it is where the operator brought it
             executor.reset(now_s)
-            executor.observe(now_s, now_s, phase, replay.calibration_epoch)
+            tcp_m = self.arm.tcp_m(row)
+            executor.observe(now_s, now_s, phase, replay.calibration_epoch, tcp_m=tcp_m)
         metadata = ChunkMetadata(
             chunk_id=f"{self.journal.session}/{self._asks}",
             condition_observation_event_time_s=now_s,

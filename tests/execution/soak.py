@@ -10,7 +10,7 @@ command of the moment in which it is made. What happens to them is not.
 
 import math
 import random
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -50,12 +50,14 @@ class Model:
     void_s: float = -math.inf
     seen: tuple[str, str] | None = None
     position_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    told_m: np.ndarray | None = None
     last_s: float | None = None
     chunk_id: str = ""
     doubted: bool = False
 
-    def saw(self, now_s: float, phase: str, epoch: str) -> None:
+    def saw(self, now_s: float, phase: str, epoch: str, told_m: np.ndarray | None) -> None:
         """An observation was used: another phase or calibration voids what is older."""
+        self.told_m = told_m
         if self.seen not in (None, (phase, epoch)):
             self.void(now_s)
         self.seen = (phase, epoch)
@@ -64,12 +66,14 @@ class Model:
         """Nothing conditioned before counts any more."""
         self.void_s = max(self.void_s, now_s)
 
-    def objections(self, rig: Rig, metadata, command, now_s: float) -> list[str]:
+    def objections(self, rig: Rig, metadata, measured_s, command, now_s: float) -> list[str]:
         """What is wrong with a command that was accepted now."""
         action, begins = command.action, command.chunk_id != self.chunk_id
         age_s = now_s - metadata.condition_observation_event_time_s
         limit_s = rig.cell.execution.maximum_age_s.get(self.seen[0] if self.seen else "", -1.0)
         far_m = float(np.linalg.norm(action[:3] - self.position_m))
+        near_m = rig.cell.execution.maximum_divergence_m + 1.01 * STEP_M
+        here = self.told_m is not None and np.linalg.norm(action[:3] - self.told_m) <= near_m
         early = self.last_s is not None and now_s - self.last_s < 0.9 * PERIOD_NS / 1e9 - 1e-9
         wrongs = {
             "a command after the end": self.ended,
@@ -81,6 +85,8 @@ class Model:
             != self.seen,
             "conditioned before a voiding event": metadata.condition_observation_event_time_s
             < self.void_s - 1e-9,
+            "checked from an arm before a voiding event": measured_s < self.void_s - 1e-9,
+            "where the arm is not": self.last_s is None and not here,
             "begins late in contact": begins
             and command.action_index > LATEST
             and metadata.task_phase != "approach",
@@ -109,12 +115,15 @@ class Walk:
         self.rig = Rig(checks=checks, queue_capacity=rng.randint(1, 3))
         self.model = Model()
         self.events = self.handed_in = 0
+        self.moved_m = np.zeros(3)  # the arm stands so far from where it was commanded to
         self.wrongs: list[str] = []
         self._transit: list = []
-        self._metadata: dict = {}
-        self._names = random.Random(rng.random()).choices(
+        self._made_of: dict = {}
+        chosen = rng.random()
+        self._names = random.Random(chosen).choices(
             [*OPERATIONS], [*OPERATIONS.values()], k=rng.randint(20, 150)
         )
+        self._arm = random.Random(chosen + 1.0)
 
     def run(self) -> "Walk":
         """Play it to its end, then ask the checker."""
@@ -150,11 +159,17 @@ class Walk:
         """A chunk whose first checked row goes on from the last command, a step a row."""
         way = np.array([self.rng.gauss(0.0, 1.0) for _ in range(3)])
         steps = np.arange(1 - first, ROWS + 1 - first)[:, None] * STEP_M * way / np.linalg.norm(way)
+        begin_m, context = self.model.position_m, self.rig.context()
+        if self.model.last_s is None and self._arm.random() < 0.8:  # the arm may be elsewhere
+            begin_m = self.model.position_m + self.moved_m
+            context = replace(context, last_action=np.append(begin_m, context.last_action[3:]))
+        if self._arm.random() < 0.1:
+            context = replace(context, measured_at_s=self.rig.now_s - 0.05)
         actions = np.zeros((ROWS, ACTION_DIM))
-        actions[:, :3] = self.model.position_m + steps
+        actions[:, :3] = begin_m + steps
         actions[:, [3, 7]] = 1.0
-        chunk = self.rig.chunk(actions=actions, **changes)
-        self._metadata[chunk.metadata.chunk_id] = chunk.metadata
+        chunk = self.rig.chunk(actions=actions, context=context, **changes)
+        self._made_of[chunk.metadata.chunk_id] = chunk.metadata, context.measured_at_s
         return chunk
 
     def _changed(self):
@@ -190,16 +205,18 @@ class Walk:
         if self.rig.stub.accepted - before != (command.action is not None):
             self.wrongs.append("a command that the controller did not accept")
         if command.action is not None:
-            metadata = self._metadata[command.chunk_id]
-            self.wrongs += self.model.objections(self.rig, metadata, command, now_s)
+            made_of = self._made_of[command.chunk_id]
+            self.wrongs += self.model.objections(self.rig, *made_of, command, now_s)
+            self.moved_m = np.zeros(3)
         self.model.doubted |= bool(self.rig.journal.doubt)
         whole = self.rng.random() < 0.9
         self.rig.now_ns += PERIOD_NS if whole else self.rng.choice((1, 17, 33)) * 1_000_000
 
     def _look(self, event_s, divergence_m=None) -> None:
         rig, now_s = self.rig, self.rig.now_s
-        if rig.executor.observe(now_s, event_s, rig.phase, rig.epoch, divergence_m):
-            self.model.saw(event_s, rig.phase, rig.epoch)
+        told_m = None if self._arm.random() < 0.05 else self.model.position_m + self.moved_m
+        if rig.executor.observe(now_s, event_s, rig.phase, rig.epoch, divergence_m, tcp_m=told_m):
+            self.model.saw(event_s, rig.phase, rig.epoch, told_m)
 
     def _observe(self) -> None:
         lot = self.rng.random()
@@ -288,6 +305,7 @@ class Walk:
         self.rig.executor.intervene(self._now())
         self.model.person = True
         self.model.last_s = None  # the person leaves the arm elsewhere, wherever
+        self.moved_m = np.array([self._arm.choice((0.0, 0.03, 0.2)), 0.0, 0.0])
 
     def _hand_back(self) -> None:
         self.rig.executor.hand_back(self.rig.now_s)
@@ -297,7 +315,7 @@ class Walk:
 
     def _reset(self) -> None:
         self.rig.executor.reset(self.rig.now_s)
-        self.model.seen = self.model.last_s = None
+        self.model.seen = self.model.last_s = self.model.told_m = None
         self.model.void(self.rig.now_s)
 
     def _phase(self) -> None:

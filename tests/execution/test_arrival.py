@@ -189,7 +189,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
     rig.begin(strict)
-    strict.observe(0.0, 0.0, "approach", "epoch-1")
+    strict.observe(0.0, 0.0, "approach", "epoch-1", tcp_m=rig.tcp_m)
 
     def issued():
         made = rig.chunk()

@@ -21,7 +21,7 @@ METADATA = ChunkMetadata(
 )  # fmt: skip
 CHUNK = Chunk(
     METADATA, ChunkTimes.of(METADATA), arrival=3, rows=16, checked_rows=(0, 16), passed=True,
-    hashed=True, scene={"post": (0.5, *UPRIGHT)},
+    hashed=True, scene={"post": (0.5, *UPRIGHT)}, measured_ns=150 * MS,
 )  # fmt: skip
 VIEW = View(
     phase="approach", calibration_epoch="e", newest_observation_ns=150 * MS,
@@ -179,6 +179,29 @@ def test_a_voiding_event_covers_what_was_there_and_a_later_one_covers_an_earlier
     assert failing(arrived_later) == set()
     both = VIEW.voided(DiscardReason.RESET, 200 * MS).voided(DiscardReason.RESET, 50 * MS)
     assert failing(replace(GOOD, view=both)) == {"after_reset"}
+
+
+def test_joints_from_before_an_event_are_void_under_whatever_image():
+    """It was checked from where the arm stood before, though what it saw came after."""
+    for reason in (DiscardReason.INTERVENTION, DiscardReason.STOPPED, DiscardReason.RESET):
+        row = f"after_{reason}".replace("stopped", "stop")
+        for measured_ns, found in ((80 * MS, set()), (80 * MS - 1, {row})):
+            moment = replace(chunk(measured_ns=measured_ns), view=VIEW.voided(reason, 80 * MS))
+            assert failing(moment) == found
+    unknown = replace(CHUNK, measured_ns=Chunk(METADATA, CHUNK.times).measured_ns)
+    never = replace(GOOD, about=unknown, view=VIEW.voided(DiscardReason.RESET, -(10**15)))
+    assert failing(never) == {"after_reset"}
+
+
+def test_who_has_no_name_commands_nothing():
+    """Neither weights nor a sampler; two that are empty are not the same."""
+    for name, field in (
+        ("checkpoint", "policy_checkpoint_hash"),
+        ("sampler", "sampler_config_hash"),
+    ):
+        nobody = replace(METADATA, **{field: ""})
+        moment = replace(view(**{name: ""}), about=replace(CHUNK, metadata=nobody))
+        assert failing(moment) == {f"{name}_mismatch"}
 
 
 def test_a_mode_of_the_controller_that_nobody_stated_does_not_hold():

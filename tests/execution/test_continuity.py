@@ -10,6 +10,7 @@ from playing import begin, checked, judged
 from genpolicy.evidence.shadow.rig import IMITATED, Rig
 from genpolicy.execution.checks import without
 from genpolicy.execution.continuity import Continuity, bytes_of, knows, rests
+from genpolicy.execution.moment import View
 from genpolicy.execution.nanoseconds import NEVER_NS
 
 ACTION = np.arange(10.0)
@@ -20,9 +21,12 @@ def chunk(last_action=ACTION, before=((0.0, 0.0), (0.0, 0.0))):
     return SimpleNamespace(context=context)
 
 
-def follows(own, of, first, row, now_ns=57):
-    times = SimpleNamespace(period_ns=50)
-    return own.follows(of, SimpleNamespace(checked_rows=(first, 16), times=times), row, now_ns)
+HERE = View(tcp_m=(0.0, 1.0, 2.0), divergence_limit_m=0.05)
+
+
+def follows(own, of, first, row, now_ns=57, view=HERE):
+    about = SimpleNamespace(checked_rows=(first, 16), times=SimpleNamespace(period_ns=50))
+    return own.follows(of, about, row, now_ns, view)
 
 
 def after(own, row=3, action=ACTION):
@@ -33,7 +37,7 @@ def after(own, row=3, action=ACTION):
 
 def test_at_first_only_the_first_checked_row_follows():
     continuity = Continuity()
-    assert follows(continuity, chunk(None), 2, 2) and continuity.given_ns is None
+    assert follows(continuity, chunk(), 2, 2) and continuity.given_ns is None
     assert not follows(continuity, chunk(), 2, 3) and not follows(continuity, chunk(), 2, 1)
 
 
@@ -70,7 +74,7 @@ def test_what_is_forgotten_binds_nobody_and_the_pace_stays():
     own = chunk()
     continuity = after(own)
     continuity.forget()
-    assert not follows(continuity, own, 0, 4) and follows(continuity, chunk(None), 0, 0)
+    assert not follows(continuity, own, 0, 4) and follows(continuity, chunk(), 0, 0)
     assert continuity.given_ns == 7
 
 
@@ -99,10 +103,89 @@ def test_after_holds_only_an_arm_that_stood_still_goes_on(now_ns, before, holds)
 def test_a_stop_that_was_cleared_is_forgotten_once():
     continuity = after(chunk())
     continuity.after(10)
-    assert follows(continuity, chunk(None), 0, 0)
+    assert follows(continuity, chunk(before=MOVING), 0, 0, 107), "no command is left to rest on"
     continuity.note(20, chunk(), 0, ACTION)
     continuity.after(10)
-    assert not follows(continuity, chunk(None), 0, 0, 70)
+    assert not follows(continuity, chunk(before=MOVING), 0, 0, 120)
+
+
+OFF_M = math.nextafter(0.05, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "seen", "holds"),
+    [(ACTION, (0.0, 1.0, 2.0), True), (ACTION, (0.05, 1.0, 2.0), True),
+     (ACTION, (OFF_M, 1.0, 2.0), False), (ACTION, (0.04, 1.04, 2.0), False),
+     (ACTION, None, False), (None, (0.0, 1.0, 2.0), False), ("text", (0.0, 1.0, 2.0), False),
+     (np.full(10, math.nan), (0.0, 1.0, 2.0), False), ([0.0, 1.0], (0.0, 1.0, 2.0), False)],
+)  # fmt: skip
+def test_where_no_command_says_where_the_arm_is_a_chunk_begins_where_it_is_seen(told, seen, holds):
+    view = View(tcp_m=seen, divergence_limit_m=0.05)
+    assert follows(Continuity(), chunk(told), 0, 0, view=view) is holds
+    # The command says it, as long as there is one.
+    assert follows(after(chunk()), chunk(ACTION.copy()), 0, 0, view=view)
+
+
+def _person(rig):
+    rig.executor.intervene(rig.now_s)
+    rig.executor.hand_back(rig.now_s)
+
+
+def _stop(rig):
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.tick()
+    rig.supervisor.human_reset(rig.now_s, "rita")
+
+
+NO_COMMAND = {
+    "the session begins": lambda rig: None,
+    "a reset": lambda rig: (rig.run(2), rig.executor.reset(rig.now_s)),
+    "a person had it": lambda rig: (rig.run(2), _person(rig)),
+    "a stop was cleared": lambda rig: (rig.run(2), _stop(rig)),
+}
+AWAY = {"elsewhere": [0.1, 0.0, 0.0], "nobody says": [], "no place": [math.nan, 0.0, 0.0]}
+
+
+def _goes_on(rig, off_m):
+    """A chunk that says it was checked from the last command; the arm is seen so far from there."""
+    here = rig.tcp_m
+    rig.observe(tcp_m=here + off_m if len(off_m) else [])
+    before = rig.stub.accepted
+    rig.deliver(rig.chunk(predecessor_chunk_id=""))
+    rig.tick(2)
+    return rig.stub.accepted - before
+
+
+@pytest.mark.parametrize("name", NO_COMMAND)
+def test_what_goes_on_was_checked_from_where_the_arm_is(name):
+    rig = Rig()
+    NO_COMMAND[name](rig)
+    assert _goes_on(rig, np.array([0.049, 0.0, 0.0])) == 2
+    judged(rig)
+
+
+@pytest.mark.parametrize("away", AWAY)
+@pytest.mark.parametrize("name", NO_COMMAND)
+@pytest.mark.parametrize("blind", ["nobody", "checks", "stub_checks"])
+def test_what_was_checked_from_elsewhere_moves_nothing(name, away, blind):
+    """Executor and stub each ask; a chunk of a far place would be a jump to it."""
+    tables = {"checks": IMITATED, "stub_checks": IMITATED}
+    if blind != "nobody":
+        tables[blind] = without(IMITATED, "continuity")
+    rig = Rig(**tables)
+    NO_COMMAND[name](rig)
+    assert _goes_on(rig, np.array(AWAY[away])) == 0
+    assert not {v.rule for v in checked(rig.end()).violations} - {"settings.checks"}
+
+
+@pytest.mark.parametrize("away", AWAY)
+@pytest.mark.parametrize("name", NO_COMMAND)
+def test_the_checker_finds_a_jump_to_where_the_arm_is_not(name, away):
+    rig = Rig(checks=without(IMITATED, "continuity"))
+    NO_COMMAND[name](rig)
+    assert _goes_on(rig, np.array(AWAY[away])) == 2
+    found = {v.rule for v in checked(rig.end()).violations}
+    assert "P5.here" in found and found <= {"P5.here", "P5.continuity", "settings.checks"}
 
 
 def test_what_cannot_be_read_rests_on_nothing():

@@ -48,7 +48,7 @@ def told(rig, event_ns):
 
 
 def told_executor(rig, event_ns):
-    rig.stub.note_observation = lambda *_: None
+    rig.stub.note_observation = lambda *_, **__: None
     rig.executor.observe(rig.now_s, event_ns / 1e9, "insert", rig.epoch)
 
 

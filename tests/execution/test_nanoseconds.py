@@ -18,7 +18,7 @@ def test_float_ticks_hit_every_row_exactly_once():
         now_s = n * 0.05  # not a multiple of 0.05 for most n
         if n % 8 == 0:
             rig.now_ns = to_ns(now_s)
-            rig.executor.observe(now_s, now_s, "approach", "epoch-1")
+            rig.executor.observe(now_s, now_s, "approach", "epoch-1", tcp_m=rig.tcp_m)
             assert rig.executor.deliver(rig.chunk(
                 action_start_time_s=now_s, condition_observation_event_time_s=now_s,
             ), now_s) is None  # fmt: skip

@@ -16,8 +16,8 @@ NOW_NS = 10**9
 EMPTY = View()
 
 
-def read(event_time_s, phase="approach", epoch="e", view=EMPTY, divergence_m=None):
-    return Observed.of(view, NOW_NS, event_time_s, phase, epoch, divergence_m)
+def read(event_time_s, phase="approach", epoch="e", view=EMPTY, **more):
+    return Observed.of(view, NOW_NS, event_time_s, phase, epoch, **more)
 
 
 def test_what_is_said_is_kept():
@@ -25,9 +25,19 @@ def test_what_is_said_is_kept():
     assert told == Observed(900_000_000, "approach", "e", "")
     assert told.payload() == {
         "event_time_ns": 900_000_000, "phase": "approach", "calibration_epoch": "e", "used": True,
-        "ignored_because": "", "divergence_m": None,
+        "ignored_because": "", "divergence_m": None, "tcp_m": [],
     }  # fmt: skip
     assert read(0.9, divergence_m=0.02).payload()["divergence_m"] == 0.02
+    assert read(0.9, tcp_m=np.array([1.0, 2, 3])).payload()["tcp_m"] == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    "none", [None, 3.0, "abc", [0.0, 1.0], [0.0] * 4, [[0.0], [1.0], [2.0]], [0.0, math.nan, 1.0],
+             [0.0, math.inf, 1.0], [0.0, "x", 1.0], object(), {}],
+)  # fmt: skip
+def test_what_is_no_place_is_nowhere(none):
+    told = read(0.9, tcp_m=none)
+    assert told.tcp_m is None and told.payload()["tcp_m"] == []
 
 
 @pytest.mark.parametrize("time_s", [math.nan, math.inf, None, "0.9", 1e300, 1.0 + 1e-9])

@@ -14,6 +14,7 @@ EVENTS, SEARCHED = 40_000, 20_000
 PLANTED = [
     ("continuity", "m from the last command", 2),
     ("continuity", "goes on after a hold", 0),
+    ("continuity", "where the arm is not", 0),
     ("pace", "too soon after the last command", 43),
     ("stopped", "a command while stopped", 0),
     ("intervention", "a command while a person commands", 1),
@@ -45,6 +46,27 @@ def test_without_a_check_the_model_objects(check, said, first):
         if any(said in wrong for wrong in wrongs):
             break
     assert any(said in wrong for wrong in wrongs), wrongs[:5]
+
+
+def _of_images_alone(check):
+    """Of what an event voids, the arm is forgotten: a new image on an old place is new."""
+    if not check.name.startswith("after_"):
+        return check
+
+    def holds(m):
+        event = m.view.voidings.get(check.reason)
+        times, arrival = m.chunk.times, m.chunk.arrival
+        return event is None or (
+            times.condition_ns >= event.before_ns and arrival >= event.arrivals
+        )
+
+    return check._replace(holds=holds)
+
+
+def test_the_model_objects_to_an_old_place_of_the_arm_under_a_new_image():
+    wrongs = soak(0, SEARCHED, tuple(map(_of_images_alone, IMITATED))).wrongs
+    assert any("an arm before a voiding event" in wrong for wrong in wrongs)
+    assert any("checker: P1.void" in wrong for wrong in wrongs)
 
 
 def test_the_same_seed_is_the_same_walk():

@@ -166,8 +166,9 @@ def test_after_a_person_the_last_command_says_nothing_of_where_the_arm_is(person
         rig.executor.intervene(rig.now_s)
         rig.advance(0.1)
         rig.executor.hand_back(rig.now_s)
-    rig.observe()
-    chunk = rig.chunk(predecessor_chunk_id="", context=StandInContext(last_action=np.full(10, 0.3)))
+    rig.observe(tcp_m=[0.3, 0.3, 0.3])
+    elsewhere = StandInContext(last_action=np.full(10, 0.3), measured_at_s=rig.now_s)
+    chunk = rig.chunk(predecessor_chunk_id="", context=elsewhere)
     if not person:
         offer = {"row": 0, "source": "policy", "arrival": 9, "sequence": 99, "now_ns": rig.now_ns}
         assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "broken_predecessor"

@@ -280,10 +280,10 @@ def test_after_a_cleared_stop_a_chunk_from_where_the_arm_stands_goes_on():
     rig.supervisor.emergency_stop(rig.now_s)
     rig.tick(2)
     rig.supervisor.human_reset(rig.now_s, "spotter")
-    elsewhere = StandInContext(last_action=np.full(10, 0.7))
-    assert [c.kind for c in rig.run(2, context=elsewhere, predecessor_chunk_id="")] == [
-        "action"
-    ] * 2
+    elsewhere = StandInContext(last_action=np.full(10, 0.7), measured_at_s=rig.now_s)
+    rig.observe(tcp_m=[0.7, 0.7, 0.7])
+    rig.deliver(rig.chunk(context=elsewhere, predecessor_chunk_id=""))
+    assert [c.kind for c in rig.tick(2)] == ["action"] * 2
     judged(rig)
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from genpolicy.verification.continuity import COMMANDS, PACE, RULE, Continuity
+from genpolicy.verification.continuity import COMMANDS, HERE, PACE, RULE, Continuity
 
 PERIOD = 50
 
@@ -15,7 +15,18 @@ def told(*numbers):
     return struct.pack(f"<{len(numbers)}d", *numbers).hex()
 
 
-def chunk(first=0, last_action="aa", motion=True, before=(0.0, 0.0)):
+A, B, C = (told(*[number] * 10) for number in (0.0, 1.0, 2.0))
+SETTINGS = {"period_ns": PERIOD, "maximum_divergence_m": 0.05}
+
+
+def began(proof=None, tcp_m=(0.0, 0.0, 0.0)):
+    """A session in which the arm was seen where a chunk says that it was checked from."""
+    own = Continuity(proof)
+    own.see("observation", {"used": True, "tcp_m": list(tcp_m)})
+    return own
+
+
+def chunk(first=0, last_action=A, motion=True, before=(0.0, 0.0)):
     ground = {
         "last_action": last_action,
         "q_cmd_rad": told(0.0, 0.0),
@@ -26,16 +37,17 @@ def chunk(first=0, last_action="aa", motion=True, before=(0.0, 0.0)):
     }  # fmt: skip
 
 
-def accept(t, row, *, arrival=0, action="aa"):
+def accept(t, row, *, arrival=0, action=A):
     return {"t": t, "row": row, "arrival": arrival, "action": action}
 
 
-def rules(*steps, forget=None):
-    own, found = Continuity(), []
+def rules(*steps, forget=None, seen=(0.0, 0.0, 0.0)):
+    own, found = began(), []
     for place, (of, m) in enumerate(steps):
         if place == forget:
             own.forget()
-        found.append([rule for rule, _ in own.follow(of, m, PERIOD)])
+            own.see("observation", {"used": True, "tcp_m": list(seen)})
+        found.append([rule for rule, _ in own.follow(of, m, SETTINGS)])
     return found
 
 
@@ -57,17 +69,37 @@ def test_a_first_row_is_the_first_that_was_checked():
 
 
 def test_another_chunk_was_checked_from_the_last_command():
-    start = (chunk(), accept(0, 0, action="bb"))
-    assert rules(start, (chunk(last_action="bb"), accept(50, 0, arrival=1)))[1] == []
-    assert rules(start, (chunk(last_action="bc"), accept(50, 0, arrival=1)))[1] == [RULE]
+    start = (chunk(), accept(0, 0, action=B))
+    assert rules(start, (chunk(last_action=B), accept(50, 0, arrival=1)))[1] == []
+    assert rules(start, (chunk(last_action=C), accept(50, 0, arrival=1)))[1] == [RULE]
     # What it was checked against is missing: a violation of its own (P6.ground).
     assert rules(start, (chunk(motion=False), accept(50, 0, arrival=1)))[1] == []
 
 
 def test_after_somebody_else_moved_the_arm_no_command_binds():
-    start, other = (chunk(), accept(0, 0)), (chunk(last_action="zz"), accept(50, 0, arrival=1))
-    assert rules(start, other, forget=1)[1] == []
+    start, other = (chunk(), accept(0, 0)), (chunk(last_action=C), accept(50, 0, arrival=1))
+    assert rules(start, other, forget=1, seen=(2.0, 2.0, 2.0))[1] == []
     assert rules(start, (chunk(), accept(20, 0, arrival=1)), forget=1)[1] == [PACE]
+
+
+@pytest.mark.parametrize(
+    ("seen", "found"),
+    [((0.0, 0.0, 0.05), []), ((0.0, 0.0, 0.0501), [HERE]), ((), [HERE]), ((0.0, 0.0), [HERE])],
+)
+def test_without_a_command_a_chunk_begins_where_the_arm_was_seen(seen, found):
+    own = began(tcp_m=seen)
+    own.see("observation", {"used": False, "tcp_m": [0.0, 0.0, 0.0]})  # it is not believed
+    own.see("state", {"tcp_m": [0.0, 0.0, 0.0]})
+    assert [rule for rule, _ in own.follow(chunk(), accept(0, 0), SETTINGS)] == found
+    assert rules((chunk(), accept(0, 0)), (chunk(), accept(50, 1)))[1] == []
+
+
+def test_what_another_session_saw_says_nothing():
+    own = began()
+    own.forget(blind=True)
+    assert [rule for rule, _ in own.follow(chunk(), accept(0, 0), SETTINGS)] == [HERE]
+    # A chunk that says nothing of what it was checked against is a violation of its own.
+    assert not list(Continuity().follow(chunk(motion=False), accept(0, 0), SETTINGS))
 
 
 @pytest.mark.parametrize(("t", "found"), [(44, [PACE]), (45, []), (50, []), (74, []), (0, [PACE])])
@@ -108,24 +140,24 @@ def test_after_a_hold_on_record_none_follows_and_another_one_was_checked_from_re
         ((chunk(before=(0.0, 0.1)), accept(50, 0, arrival=1)), [RULE]),
         ((chunk(), accept(50, 0, arrival=1)), []),
     ):
-        own = Continuity()
-        assert not list(own.follow(chunk(), accept(0, 0), PERIOD))
+        own = began()
+        assert not list(own.follow(chunk(), accept(0, 0), SETTINGS))
         own.hold({"t": t, "reason": reason})
         own.hold({"t": 50, "reason": "watchdog"})
-        assert [rule for rule, _ in own.follow(*second, PERIOD)] == found
+        assert [rule for rule, _ in own.follow(*second, SETTINGS)] == found
         assert not list(
             own.follow(
-                second[0], accept(100, second[1]["row"] + 1, arrival=second[1]["arrival"]), PERIOD
+                second[0], accept(100, second[1]["row"] + 1, arrival=second[1]["arrival"]), SETTINGS
             )
         )
 
 
 @pytest.mark.parametrize(("reason", "t"), [("empty", 20), ("watchdog", 50)])
 def test_what_is_not_due_and_what_goes_on_at_once_is_no_hold(reason, t):
-    own = Continuity()
-    assert not list(own.follow(chunk(), accept(0, 0), PERIOD))
+    own = began()
+    assert not list(own.follow(chunk(), accept(0, 0), SETTINGS))
     own.hold({"t": t, "reason": reason})
-    assert not list(own.follow(chunk(), accept(50, 1), PERIOD))
+    assert not list(own.follow(chunk(), accept(50, 1), SETTINGS))
 
 
 class Slide:
@@ -154,13 +186,14 @@ def slid(q_cmd, before, *, rows=4):
 
 def slides(second, *, t=100, after=2, forget=False, hold=""):
     """Findings of a chunk behind so many rows of one that began at 0."""
-    own, first = Continuity(Slide()), slid((0.0, 0.0), [])
+    own, first = began(Slide()), slid((0.0, 0.0), [])
     for row in range(after):
-        assert not list(own.follow(first, accept(50 * row, row, action=at(row + 1.0)), PERIOD))
+        assert not list(own.follow(first, accept(50 * row, row, action=at(row + 1.0)), SETTINGS))
     if forget:
         own.forget()
+        own.see("observation", {"used": True, "tcp_m": [7.0, 0.0, 0.0]})
     own.hold({"t": t, "reason": hold})
-    found = own.follow(second, accept(t, 0, arrival=1, action=at(9.0)), PERIOD)
+    found = own.follow(second, accept(t, 0, arrival=1, action=at(9.0)), SETTINGS)
     return [rule for rule, _ in found]
 
 

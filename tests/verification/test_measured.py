@@ -135,13 +135,24 @@ def test_who_does_not_say_where_the_tcp_is_seen_is_not_asked():
 def test_how_far_the_arm_is_off_lies_between_state_and_command(told_m, found):
     action = np.array([0.1, 0.2, 0.6, *COLUMNS, 0.01], dtype="<f8").tobytes().hex()
     looks = [
-        ("observation", {"t": t * MS, "divergence_m": away_m})
+        ("observation", {"t": t * MS, "divergence_m": away_m, "tcp_m": state(t)[1]["tcp_m"]})
         for t, away_m in ((0, None), (50, told_m))
     ]
     journal = [SESSION, state(0), looks[0], ("accept", {"t": 0, "action": action}), state(50),
                looks[1]]  # fmt: skip
     view = Measured(robot())
     assert [rule for kind, m in journal for rule, _ in view.follow(kind, m)] == found
+
+
+@pytest.mark.parametrize(("off_m", "found"), [
+    (0.0, []), (9e-7, []), (1e-4, ["state.place"]), (None, ["state.place"]),
+])  # fmt: skip
+def test_where_an_observation_has_the_arm_the_state_has_it(off_m, found):
+    tcp_m = [] if off_m is None else [part + off_m for part in state(50)[1]["tcp_m"]]
+    look = ("observation", {"t": 50 * MS, "divergence_m": None, "tcp_m": tcp_m})
+    view = Measured(robot())
+    told = [rule for kind, m in (SESSION, *BOTH, look) for rule, _ in view.follow(kind, m)]
+    assert told == found
 
 
 @pytest.mark.parametrize(("velocity", "found"), [

@@ -259,11 +259,23 @@ def stands(x_m, y_m=0.0):
     ({"fixture": stands(0.5)["post"]}, ["P1.scene"]),
 ])  # fmt: skip
 def test_a_chunk_that_was_checked_in_another_scene_than_the_one_seen_is_found(view, checked, found):
-    assert rules(view, motion={"scene": checked}) == ["P1.scene"]  # nobody has said any
+    motion = {"scene": checked, "measured_ns": 1000 * MS}
+    assert rules(view, motion=motion) == ["P1.scene"]  # nobody has said any
     assert list(view.follow("scene", {"bodies": stands(0.5)})) == []
-    assert rules(view, motion={"scene": checked}) == found
+    assert rules(view, motion=motion) == found
     assert list(view.follow("scene", {"bodies": {"": ""}})) == []
-    assert rules(view, motion={"scene": checked}) == ["P1.scene"]
+    assert rules(view, motion=motion) == ["P1.scene"]
+
+
+@pytest.mark.parametrize(("measured_ms", "found"), [(1050, []), (1049, ["P1.void"])])
+def test_what_an_event_voids_it_voids_by_the_joints_too(view, measured_ms, found):
+    """What it saw came after; where the arm stood when it was checked came before."""
+    assert list(view.follow("scene", {"bodies": stands(0.5)})) == []
+    assert list(view.follow("reset", {"session_epoch": 1, "t": 1050 * MS})) == []
+    observed(view, 1100)
+    chunk = {"condition_ns": 1100 * MS, "session_epoch": 1, "arrival": 9}
+    motion = {"scene": stands(0.5), "measured_ns": measured_ms * MS}
+    assert rules(view, motion=motion, **chunk) == found
 
 
 def test_a_change_that_nobody_notes_or_notes_otherwise_is_found(view):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import GRIPPER, join_action
+from genpolicy.contract.action import GRIPPER, POSITION, join_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.context import Context
@@ -35,6 +35,7 @@ class Case:
         free_phases: The task's phases of motion in the open.
         unprojected: The chunk is judged as it is, as after a projection that repairs nothing:
             what projection removes cannot be shown to the checks behind it otherwise.
+        tcp_m: Where the TCP is seen, m; None: where it was commanded to last. Shape (3,).
     """
 
     proposal: Proposal
@@ -43,6 +44,12 @@ class Case:
     obstacles: tuple[str, ...] = ()
     free_phases: frozenset[str] = frozenset()
     unprojected: bool = False
+    tcp_m: Array | None = None
+
+    @property
+    def seen_m(self) -> Array:
+        """Where the TCP is seen, m. Shape (3,)."""
+        return self.context.last_action[POSITION] if self.tcp_m is None else self.tcp_m
 
     def with_actions(self, actions: Array) -> "Case":
         """The case with other actions."""
@@ -128,14 +135,18 @@ def still(case: Case, checker: FeasibilityChecker, q_rad: Array, *, rows: int = 
     context = case.context
     target = _action(checker, q_rad, context.last_action[GRIPPER])
     actions = np.tile(target, (context.first_index + rows, 1))
-    return case.with_context(
-        q_cmd=q_rad,
-        q_meas=q_rad,
-        last_action=target,
-        q_cmd_history=np.tile(q_rad, (2, 1)),
-        dq_meas=np.zeros(len(q_rad)),
-        state_time_s=None,
-    ).with_actions(actions)
+    return (
+        replace(case, tcp_m=None)
+        .with_context(
+            q_cmd=q_rad,
+            q_meas=q_rad,
+            last_action=target,
+            q_cmd_history=np.tile(q_rad, (2, 1)),
+            dq_meas=np.zeros(len(q_rad)),
+            state_time_s=None,
+        )
+        .with_actions(actions)
+    )
 
 
 def moving(case: Case, checker: FeasibilityChecker, step_rad: Array) -> Case:
@@ -146,7 +157,7 @@ def moving(case: Case, checker: FeasibilityChecker, step_rad: Array) -> Case:
     there = _action(checker, q_rad + step_rad, opening)
     actions = np.concatenate([np.tile(here, (context.first_index, 1)), there[None]])
     history = np.stack([q_rad - 2 * step_rad, q_rad - step_rad])
-    moved = case.with_context(
+    moved = replace(case, tcp_m=None).with_context(
         q_meas=q_rad, last_action=here, q_cmd_history=history, state_time_s=None,
         dq_meas=step_rad / checker.cell.action_period_s,
     )  # fmt: skip

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import ACTION_DIM
+from genpolicy.contract.action import ACTION_DIM, POSITION
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.execution.arrival import LAYER_COUNT
@@ -168,10 +168,25 @@ class Rig:
         """Time, s."""
         return self.now_ns / 1e9
 
-    def observe(self, age_s: float = 0.0, divergence_m: float | None = None) -> bool:
-        """Hand over an observation of this age, in the rig's phase and epoch."""
-        event_time_s = self.now_s - age_s
-        return self.executor.observe(self.now_s, event_time_s, self.phase, self.epoch, divergence_m)
+    def observe(
+        self, age_s: float = 0.0, divergence_m: float | None = None, tcp_m: object = None
+    ) -> bool:
+        """Hand over an observation of this age, in the rig's phase and epoch.
+
+        Args:
+            age_s: Its age, s.
+            divergence_m: What it says that the arm is off the last command, if anything, m.
+            tcp_m: Where it measured the TCP, m; None: where it was commanded to. Shape (3,).
+        """
+        return self.executor.observe(
+            self.now_s, self.now_s - age_s, self.phase, self.epoch, divergence_m,
+            tcp_m=self.tcp_m if tcp_m is None else cast(Array, tcp_m),
+        )  # fmt: skip
+
+    @property
+    def tcp_m(self) -> Array:
+        """Where the arm is, which goes where it is commanded to at once, m. Shape (3,)."""
+        return self.context().last_action[POSITION]
 
     def see(self, **places_m: float) -> None:
         """The bodies of the scene are seen upright, each so far along one axis, m."""
@@ -255,8 +270,13 @@ class Rig:
         return commands
 
     def run(self, count: int | None = None, **changes: Any) -> list[Command]:
-        """Observe, deliver a (changed) chunk, tick it through, or so many of its actions."""
-        self.observe()
+        """Observe, deliver a (changed) chunk, tick it through, or so many of its actions.
+
+        The arm is seen where the chunk says that it was checked from.
+        """
+        context = changes.get("context")
+        checked = isinstance(context, StandInContext)
+        self.observe(tcp_m=context.last_action[POSITION] if checked else None)
         self.deliver(self.chunk(**changes))
         return self.tick(self.cell.horizons.execution_horizon if count is None else count)
 

@@ -67,9 +67,9 @@ def play(
         number: Number of the observation.
         measures: What a table states of each candidate, if anything.
     """
-    metadata, now_s = judged[0][0].proposal.metadata, judged[0][0].context.now_s
+    now_s = judged[0][0].context.now_s
     executor, stub, journal = _begin(cell, item, judged[0][0], fixture, number)
-    _answer(executor, item, metadata.chunk_id, now_s)
+    _answer(executor, item, judged[0][0], now_s)
     _note(journal, judged, measures, now_s=now_s)
     delivered = _deliver(executor, judged, now_s=now_s)
     leaves = item.phase if fixture != IN_FLIGHT_PHASE_CHANGE else f"after {item.phase}"
@@ -107,7 +107,7 @@ def play_incident(
     now_s = late_s if incident.late else context.now_s
     if newer is not None:
         now_s += cell.horizons.action_period_s
-    _answer(executor, item, metadata.chunk_id, now_s)
+    _answer(executor, item, case, now_s)
     incident.happen(Way(
         executor, stub.supervisor, journal, item, case.poses, context.active_checkpoint_hash,
         context.active_sampler_hash, now_s,
@@ -124,10 +124,11 @@ def play_incident(
     return _played(journal, stub, balance, arrivals.count(None))
 
 
-def _answer(executor: Executor, item: Observation, invocation: str, now_s: float) -> None:
+def _answer(executor: Executor, item: Observation, case: Case, now_s: float) -> None:
     """An invocation on the observation at time 0, which answers now, while another one comes."""
+    invocation = case.proposal.metadata.chunk_id
     executor.begin_invocation(0.0, invocation)
-    executor.observe(now_s, now_s, item.phase, item.calibration_epoch)
+    executor.observe(now_s, now_s, item.phase, item.calibration_epoch, tcp_m=case.seen_m)
     executor.end_invocation(now_s, invocation, "answered")
 
 
@@ -241,7 +242,7 @@ def _begin(
     active = case.context
     executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
     executor.controller(0.0, cell.controller_mode)
-    executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
+    executor.observe(0.0, 0.0, item.phase, item.calibration_epoch, tcp_m=case.seen_m)
     executor.see(0.0, case.poses)
     return executor, stub, journal
 

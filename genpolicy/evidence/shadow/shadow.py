@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.selector import propose
+from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import Candidate, ChunkMetadata
 from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.shadow.candidate_rows import RowLabels, candidate_row, measures_of
@@ -271,7 +272,10 @@ def case_of(
     )  # fmt: skip
     context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_rows)
     proposal = propose([Candidate(metadata, actions)])
-    return Case(proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases)
+    return Case(
+        proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases,
+        tcp_m=task.action_at(observation)[POSITION],
+    )  # fmt: skip
 
 
 def _joints_before(shadow: Shadow, item: Observation, q_rad: Array) -> Array | None:

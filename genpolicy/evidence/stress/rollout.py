@@ -130,7 +130,8 @@ class Rollout:
         self.tally.path_m.append(np.array(position))
         self._exposures.expose(now_s, observation, world.phase, world.calibration_epoch)
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
-        self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
+        told = now_s, world.phase, world.calibration_epoch, divergence_m
+        self.executor.observe(now_s, *told, tcp_m=position)
         self._supervise(now_s)
         if not self.done:
             self._deliveries.collect(now_s)
