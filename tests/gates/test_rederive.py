@@ -110,7 +110,8 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
         measured.note(now_s)
         executor.see(now_s, task.scene_poses(seen))
         journal.exposure(now_s, seen)
-        executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
+        place_m, _ = world.tcp_pose
+        executor.observe(now_s, now_s, "approach", "epoch_1", 0.0, tcp_m=place_m)
         executor.tick(now_s)
         journal.arrived(now_s + SENSED_S, exposed_s=now_s)
     executor.begin_invocation(0.2, "one", repr(FIRST_S))

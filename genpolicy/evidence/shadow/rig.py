@@ -275,8 +275,8 @@ class Rig:
         The arm is seen where the chunk says that it was checked from.
         """
         context = changes.get("context")
-        checked = isinstance(context, StandInContext)
-        self.observe(tcp_m=context.last_action[POSITION] if checked else None)
+        told = isinstance(context, StandInContext)
+        self.observe(tcp_m=cast(StandInContext, context).last_action[POSITION] if told else None)
         self.deliver(self.chunk(**changes))
         return self.tick(self.cell.horizons.execution_horizon if count is None else count)
 
