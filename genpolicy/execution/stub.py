@@ -165,12 +165,13 @@ class ControllerStub:
             source: policy or fallback.
             arrival: The executor's number of the chunk.
             sequence: Grows with every offer.
-            now_ns: Time of acceptance.
+            now_ns: Time of acceptance; where the session has seen a later one, that.
 
         Returns:
             None when accepted.
         """
         self.arrivals += 1
+        now_ns = max(now_ns, self._journal.latest_ns)  # no chunk is young by an old time
         known = isinstance(source, str) and type(row) is type(sequence) is int
         about = read_chunk(admitted, source=source, arrival=arrival) if known else None
         place = {"arrival": arrival, "chunk_id": shape_of(admitted)[1], "row": row}
