@@ -38,8 +38,7 @@ from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of
 
-OVERRIDES = "overrides.yaml"
-LISTED = "overrides"
+OVERRIDES, LISTED = "overrides.yaml", "overrides"
 OVERRIDDEN = "OVERRIDDEN"
 """How every sentence about one begins, so that it is found and shown in red."""
 NEEDED = ("gate", "criterion", "limit", "by", "reason", "expires")

@@ -52,8 +52,6 @@ NO_FRAMES = {
 MADE = {
     ("genpolicy/pages/figures/checks.py", "size"): "pandas: `agg` names it so",
     ("genpolicy/pages/figures/checks.py", "sum"): "the same",
-    ("gates/pages/plots_need.py", "mean"): "the same",
-    ("gates/pages/plots_need.py", "size"): "the same",
     ("gates/pages/plots_convergence.py", "total"): "made in `gates.reproducibility.convergence`",
     ("gates/reproducibility/matching.py", "total"): "the same",
     ("gates/pages/plots_density.py", "gain"): "made in `gates.reproducibility.densities`",
