@@ -30,7 +30,7 @@ import itertools
 import os
 import platform
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr
 from pathlib import Path
 
@@ -113,8 +113,7 @@ class Contenders:
             alone = [Ours(self.start(seed)) for seed in SEEDS]
             peer = Peer(self.start())
             stacks = {way: self.stacked(way) for way in ("vmap", "bmm")}
-            for run, _ in itertools.product([*alone, peer, *stacks.values()], range(CHECKED)):
-                run()
+            run_each([*alone, peer, *stacks.values()], CHECKED)
         self._held("peer", [peer.average.shadow_params], alone[:1])
         for way, stack in stacks.items():
             self._held(way, [stack.of_seed(place) for place in range(len(SEEDS))], alone)
@@ -124,6 +123,13 @@ class Contenders:
         if not off <= AGREES:
             sys.exit(f"{self.method}: {name} and ours differ by {off} after {CHECKED} updates, "
                      f"expected at most {AGREES}.")  # fmt: skip
+
+
+def run_each(trainings: Sequence[Callable[[], None]], updates: int) -> None:
+    """Some updates of each."""
+    for training in trainings:
+        for _ in range(updates):
+            training()
 
 
 def averaged(own: Ours) -> list[Tensor]:
@@ -222,8 +228,7 @@ def differences(contenders: Contenders, updates: int) -> Iterator[str]:
         alone = [Ours(contenders.start(seed)) for seed in SEEDS]
         stacks = {way: contenders.stacked(way) for way in ("vmap", "bmm")}
         before = [weight.detach().clone() for weight in averaged(alone[0])]
-        for run, _ in itertools.product([*alone, *stacks.values()], range(updates)):
-            run()
+        run_each([*alone, *stacks.values()], updates)
     moved = apart(averaged(alone[0]), before)
     for way, stack in stacks.items():
         pairs = [(stack.of_seed(place), averaged(own)) for place, own in enumerate(alone)]
@@ -242,7 +247,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Check, time, print."""
     parser = argparse.ArgumentParser(prog="benchmarks.training")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
-    parser.add_argument("--seeds-of", nargs="*", choices=METHODS, default=list(METHODS))
+    parser.add_argument("--seeds-of", nargs="*", choices=METHODS, default=["diffusion"])
     parser.add_argument("--sweep-of", nargs="*", choices=METHODS, default=["diffusion"])
     parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--rounds", type=int, default=ROUNDS)
@@ -265,8 +270,9 @@ def report(args: argparse.Namespace) -> None:
     print(head("method", "way", "threads", "processor", "wall", "processor / ours", "wall / ours"))
     size, told = Size(args.width, args.batch), []
     all_ways = {method: Contenders(method, data, size) for method in args.methods}
+    seeds_of = [method for method in args.methods if method in args.seeds_of]
     for method, contenders in all_ways.items():
-        seeds = method in args.seeds_of
+        seeds = method in seeds_of
         found = measure(contenders, args, seeds=seeds)
         print_all(rows(method, found))
         told.append(f"{method}: {arithmetic(contenders, found)}")
@@ -276,9 +282,10 @@ def report(args: argparse.Namespace) -> None:
         print(f"{method} of other sizes, 1 thread, processor ms; ratios to one seed of that size")
         print(head("trunk width", "batch", "parameters", "ours", "least", "vmap", "bmm"))
         print_all(sweep(method, data, args))
-    print(f"weights after {args.compared} updates, stacked against alone")
-    print(head("method", "way", "equal bits, least seed", "largest difference", "moved by"))
-    for method in args.seeds_of:
+    if seeds_of:
+        print(f"weights after {args.compared} updates, stacked against alone")
+        print(head("method", "way", "equal bits, least seed", "largest difference", "moved by"))
+    for method in seeds_of:
         print_all(differences(all_ways[method], args.compared))
     print(f"load at the end {os.getloadavg()[0]:.1f}")
 

@@ -19,9 +19,16 @@ from genpolicy.policies.objectives import masked_mean
 from genpolicy.policies.schedules import squared_cosine, straight_path
 from genpolicy.policies.training import averaging_decay, learning_rate
 
+Drawn = tuple[Tensor | None, Tensor | None, Tensor]
 Way = Literal["vmap", "bmm"]
 SMALL = 1e-6
 """What `clip_grad_norm_` adds to a norm."""
+
+
+def stack(own: Sequence[Tensor | None]) -> Tensor | None:
+    """What all seeds have, or what none has."""
+    there = [part for part in own if part is not None]
+    return torch.stack(there) if there else None
 
 
 class Evaluation(nn.Module):
@@ -59,7 +66,7 @@ class Stacked:
         self.schedule = squared_cosine(starts[0].request.head.diffusion_levels)
         self.done = 0
 
-    def drawn(self, actions: Tensor, generator: torch.Generator) -> tuple[Tensor | None, ...]:
+    def drawn(self, actions: Tensor, generator: torch.Generator) -> Drawn:
         """Noisy chunks, their times and the target of one seed, as its objective draws them."""
         method = self.starts[0].request.method
         if method == "chunked_bc":
@@ -124,11 +131,9 @@ class Stacked:
             seen.append(data.observations[rows])
             weight.append(data.weight[rows])
             given.append(self.drawn(data.actions[rows], generator))
-        values, time, target = (
-            None if own[0] is None else torch.stack(own) for own in zip(*given, strict=True)
-        )
-        said = self.say(torch.stack(seen), values, time)
-        errors = (said - target).square()
+        values, time, target = zip(*given, strict=True)
+        said = self.say(torch.stack(seen), stack(values), stack(time))
+        errors = (said - torch.stack(target)).square()
         losses = [masked_mean(*own) for own in zip(errors, weight, strict=True)]
         for group in self.optimiser.param_groups:
             group["lr"] = learning_rate(self.done, self.config)

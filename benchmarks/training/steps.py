@@ -7,6 +7,7 @@ import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -148,7 +149,7 @@ class Peer:
         self.method, self.config = start.request.method, config
         self.order, self.generator = start.order(), start.generator()
         levels = start.request.head.diffusion_levels
-        self.scheduler = DDPMScheduler(levels, beta_schedule="squaredcos_cap_v2")
+        self.scheduler: Any = DDPMScheduler(levels, beta_schedule="squaredcos_cap_v2")
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=config.learning_rate,
             betas=(config.beta_1, config.beta_2), weight_decay=config.weight_decay,
