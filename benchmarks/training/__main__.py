@@ -50,7 +50,7 @@ ASKED = 1.6
 """Times of one that three seeds may take."""
 AGREES, CHECKED, COMPARED = 1e-4, 3, 50
 WIDTHS, BATCHES = (384, 192, 96, 48), (256, 32)
-ROUNDS, SWEPT, UPDATES = 11, 7, 2
+ROUNDS, SWEPT, UPDATES = 9, 7, 2
 """Rounds at the configured size and of each smaller one; updates of a turn that are timed."""
 Times = Mapping[str, Mapping[str, Array]]
 

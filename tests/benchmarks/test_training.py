@@ -90,6 +90,26 @@ def test_each_seed_is_a_training_of_its_own(data):
     assert np.array_equal(np.array(near) < 1e-6, np.eye(3, dtype=bool))
 
 
+def test_each_seed_is_clipped_by_its_own_norm(data):
+    own = training.Contenders("flow", data, Size(48, 16))
+    stack, alone = own.stacked("bmm"), [own.start(seed) for seed in training.SEEDS]
+    for place, (start, size) in enumerate(zip(alone, (1e-3, 1e-1, 1.0), strict=True)):
+        weights = list(start.network.parameters())
+        for weight in weights:
+            weight.grad = size * torch.randn(weight.shape)
+        if place == 0:
+            for whole in stack.current:
+                whole.grad = torch.empty_like(whole)
+        for whole, weight in zip(stack.current, weights, strict=True):
+            whole.grad[place] = weight.grad
+        norm = torch.nn.utils.clip_grad_norm_(weights, 1.0)
+        assert (norm > 1.0) == (place > 0)
+    stack._clip()
+    for place, start in enumerate(alone):
+        for whole, weight in zip(stack.current, start.network.parameters(), strict=True):
+            assert torch.allclose(whole.grad[place], weight.grad, rtol=1e-5)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_products_are_those_of_the_gradients_that_an_update_takes(method, data):
     start = Start(method, data, size=Size(48, 16))
