@@ -88,6 +88,11 @@ def texts_once(texts: Iterable[str], names: Collection[str]) -> list[str]:
     return [one.text for one in said_once((Doubt("", "", text) for text in texts), names)]
 
 
+def about_one_of(text: str, names: Collection[str]) -> bool:
+    """Whether a sentence is about one of these candidates, by its head or its question."""
+    return bool(_apart(text, names)[0])
+
+
 def _apart(text: str, names: Collection[str]) -> tuple[str, str]:
     """The candidate that a sentence is about, and the sentence with a gap in its place.
 

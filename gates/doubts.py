@@ -6,11 +6,11 @@ how the evidence was made (few units, one seed, an average) is in `gates.doubts_
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from gates.closeness import BY_CHANCE, by_room, closeness
-from gates.doubt import MOST_NAMED, Doubt, about, named, said_once
+from gates.doubt import MOST_NAMED, Doubt, about, about_one_of, named, said_once
 from gates.doubts_of_evidence import (
     an_average,
     cold_start,
@@ -100,11 +100,24 @@ def for_a_card(report: GateReport, candidate: str) -> list[str]:
         report: Of one gate.
         candidate: The promoted one.
     """
-    kept = tuple(
-        c for c in report.criteria if c.candidate in (None, candidate) or c.verdict == "FAIL"
-    )
-    found = doubts_of(report.model_copy(update={"criteria": kept, "caveats": ()}))
+    found = doubts_of(about_these(report, [candidate]).model_copy(update={"caveats": ()}))
     return [f"Gate {doubt.gate}, {doubt.kind}: {doubt.text}" for doubt in found]
+
+
+def about_these(report: GateReport, names: Collection[str]) -> GateReport:
+    """What a report says of the whole gate and of these candidates, and what stopped others."""
+    kept = (c for c in report.criteria if c.candidate in (None, *names) or c.verdict == "FAIL")
+    others = report.candidates.keys() - set(names)
+    caveats = (text for text in report.caveats if not about_one_of(text, others))
+    return report.model_copy(update={"criteria": tuple(kept), "caveats": tuple(caveats)})
+
+
+def about_others(report: GateReport, names: Collection[str]) -> GateReport:
+    """The rest of a report: what is said of other candidates than these, and did not stop them."""
+    kept = (c for c in report.criteria if c.candidate not in (None, *names) and c.verdict != "FAIL")
+    others = report.candidates.keys() - set(names)
+    caveats = (text for text in report.caveats if about_one_of(text, others))
+    return report.model_copy(update={"criteria": tuple(kept), "caveats": tuple(caveats)})
 
 
 def _not_measured(report: GateReport) -> Iterator[Doubt]:
@@ -124,7 +137,7 @@ def _not_decided(report: GateReport) -> Iterator[Doubt]:
 def _stopped(report: GateReport) -> Iterator[Doubt]:
     """A candidate that fails beside one that passes: whoever chooses knows what fell away."""
     for name, broken in sorted(stopping(report).items()):
-        if report.candidates[name] == "FAIL" and report.verdict == "PASS":
+        if broken and report.candidates[name] == "FAIL" and report.verdict == "PASS":
             ids = tuple(c.id for c in broken)
             yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(ids)}", ids)
 

@@ -3,13 +3,13 @@
 Everything follows from the reports alone, so that the page is the same wherever they lie.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from gates.closeness import BY_CHANCE, Closeness, by_room, closeness, first_what_does_not_hold
 from gates.doubt import Doubt, sentence
-from gates.doubts import of_a_ladder
 from gates.more import INSIDE, hardly_decided
+from gates.pages.desk_about import answers_about, asked_about, doubts_about
 from gates.pages.numbers import at_its_end, beyond, judged_at
 from gates.protection import REHEARSED
 from gates.readable import between, human, of_units
@@ -128,12 +128,27 @@ class Part:
 
 @dataclass(frozen=True)
 class Desk:
-    """The page: all of it from the reports."""
+    """The page: all of it from the reports.
+
+    Attributes:
+        asked: What the reader is asked for.
+        about: Candidates that it is asked about; all bars, duties and doubts are theirs, or of a
+            whole gate.
+        boxes: One a gate.
+        doubts: What the reader weighs one by one.
+        not_shown: Caveats.
+        of_others: Both about candidates that nobody asks about.
+        bars: What could be near its limit.
+        exact: How many more hold.
+        parts: One an owner.
+    """
 
     asked: Asked
+    about: tuple[str, ...]
     boxes: tuple[Box, ...]
     doubts: tuple[Doubt, ...]
     not_shown: tuple[Doubt, ...]
+    of_others: tuple[Doubt, ...]
     bars: tuple[Bar, ...]
     exact: int
     parts: tuple[Part, ...]
@@ -151,32 +166,28 @@ def desk_of(
         pending: What of the card waits for people, as `desk_card.Signing.pending` says it.
         unreadable: Why the report of a gate that lies there cannot be read, by gate.
     """
-    present = [gate for gate in GATES if gate in reports]
+    about = asked_about(reports)
+    shown = {gate: answers_about(reports[gate], about) for gate in GATES if gate in reports}
     bars = [
         Bar(near, gate, at_its_end(c), human(c, c.threshold), beyond(c))
-        for gate in present
-        for near in by_room(_shown(reports[gate]))
+        for gate, answers in shown.items()
+        for near in by_room(answers)
         for c in (near.answer,)
     ]
-    judged = [answer for gate in present for answer in _shown(reports[gate])]
-    doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
+    judged = [answer for answers in shown.values() for answer in answers]
+    doubts, not_shown, of_others = doubts_about(reports, about)
     return Desk(
         asked=_asked(reports, pending, unreadable),
-        boxes=tuple(_box_of(gate, reports, unreadable) for gate in GATES),
-        doubts=tuple(doubts),
-        not_shown=tuple(not_shown),
+        about=about,
+        boxes=tuple(_box_of(gate, reports, about, unreadable) for gate in GATES),
+        doubts=doubts,
+        not_shown=not_shown,
+        of_others=of_others,
         bars=tuple(sorted(bars, key=lambda bar: first_what_does_not_hold(bar.near))),
         exact=sum(answer.verdict == "PASS" for answer in judged)
         - sum(bar.near.holds for bar in bars),
-        parts=tuple(_part(owner, reports) for owner in OWNERS),
+        parts=tuple(_part(owner, shown) for owner in OWNERS),
     )
-
-
-def _shown(report: GateReport) -> list[Answer]:
-    """Criteria of the whole gate, and of the candidates that pass it or of all if none does."""
-    passing = {name for name, verdict in report.candidates.items() if verdict == "PASS"}
-    kept = {report.promoted} if report.promoted else passing or set(report.candidates)
-    return [c for c in report.criteria if c.candidate is None or c.candidate in kept]
 
 
 def other_below(reports: Mapping[Gate, GateReport], gate: Gate) -> Gate | None:
@@ -263,26 +274,31 @@ def _next(decided: Answer, decision: str) -> str:
     return sentence(decided.caveat.rpartition("; ")[2].removeprefix(f"{INSIDE}: "))
 
 
-def _box_of(gate: Gate, reports: Mapping[Gate, GateReport], unreadable: Mapping[Gate, str]) -> Box:
+def _box_of(
+    gate: Gate,
+    reports: Mapping[Gate, GateReport],
+    about: Collection[str],
+    unreadable: Mapping[Gate, str],
+) -> Box:
     report = reports.get(gate)
     if report is None:
         return Box(gate, NAMES[gate], UNREADABLE if gate in unreadable else "NOT JUDGED", "", "")
     if gate == "E" and report.verdict == "PENDING_REVIEW" and rehearsed(reports):
         box = Box(gate, NAMES[gate], report.verdict, "", NO_CARD)
     else:
-        box = _box(gate, report)
+        box = _box(gate, report, about)
     below = other_below(reports, gate)
     of = f"{box.of}; judged over another report of gate {below}" if below else box.of
     return replace(box, of=of, overridden=bool(report.overrides))
 
 
-def headline(report: GateReport) -> list[Answer]:
-    """The criteria whose numbers are the one number of a gate: of it, or of each candidate."""
-    return [c for c in _shown(report) if c.id == HEADLINES[report.gate][0]]
+def headline(report: GateReport, about: Collection[str]) -> list[Answer]:
+    """The criteria whose numbers are the one number of a gate: of it, or of these candidates."""
+    return [c for c in answers_about(report, about) if c.id == HEADLINES[report.gate][0]]
 
 
-def _box(gate: Gate, report: GateReport) -> Box:
-    of, said = HEADLINES[gate][1], headline(report)
+def _box(gate: Gate, report: GateReport, about: Collection[str]) -> Box:
+    of, said = HEADLINES[gate][1], headline(report, about)
     if gate == "E" and said and said[0].threshold is not None:
         signed, all_of = int(said[0].measured or 0), human(said[0], said[0].threshold)
         return Box(gate, NAMES[gate], report.verdict, f"{signed or 'none'} of {all_of}", of)
@@ -295,14 +311,8 @@ def _box(gate: Gate, report: GateReport) -> Box:
     return Box(gate, NAMES[gate], report.verdict, each, of)
 
 
-def _part(owner: str, reports: Mapping[Gate, GateReport]) -> Part:
-    own = [
-        (gate, answer)
-        for gate in GATES
-        if gate in reports
-        for answer in _shown(reports[gate])
-        if answer.owner == owner
-    ]
+def _part(owner: str, shown: Mapping[Gate, list[Answer]]) -> Part:
+    own = [(gate, c) for gate, answers in shown.items() for c in answers if c.owner == owner]
     own.sort(key=lambda entry: _weight(entry[1]))
     return Part(
         owner=owner,

@@ -12,8 +12,8 @@ from gates.card.commands import card
 from gates.pages import page
 from gates.writing import write_gate
 
-KEPT = {"gate", "also", "verdict", "criteria", "candidate", "signed"}
-"""Fields that the page looks something up by: gates, verdicts, places of criteria."""
+KEPT = {"gate", "also", "verdict", "criteria", "candidate", "signed", "about"}
+"""Fields that the page looks something up by: gates, verdicts, candidates, places of criteria."""
 SECTIONS = [
     "What could make this wrong", "How close to each limit", "Watch it", "What it costs",
     "Evidence, gate by gate", "What you sign", "Your part", "The gates",
