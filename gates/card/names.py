@@ -88,6 +88,8 @@ OF_ALPHABETS = "\u0131\u0196\u0269\u01c0\u0263\u028b\u00e6\u0153\u0138"
 The others are phonetic signs and small capitals; who writes one in a name means another letter.
 """
 _DRAWN = str.maketrans({one: shape for shape, alike in LOOKS_LIKE.items() for one in alike})
+_PAIRS = {"rn": "m", "vv": "w", "VV": "W"}
+"""Letters of one word that are drawn like one letter."""
 _ONE_STROKE = str.maketrans({"I": "l", "1": "l", "0": "O"})
 
 
@@ -117,20 +119,28 @@ def disguise(name: str) -> str:
 def as_read(name: str) -> str:
     """A name as a hurried reader takes it: whatever its case, its spaces and its script.
 
-    Cyrillic, Greek and other letters count as the Latin ones that they look like, and what stands
-    between letters as a space.
+    Cyrillic, Greek and other letters count as the Latin ones that they look like, two `v` as the
+    `w` that they look like, and what stands between letters as nothing.
     """
     drawn = name.translate(_DRAWN).casefold().translate(_DRAWN)
-    return " ".join("".join(c if _is_of_a_word(c) else " " for c in drawn).split())
+    return "".join(word.replace("vv", "w") for word in _words(drawn))
 
 
 def as_drawn(name: str) -> str:
     """A name as a careful reader sees it, where strokes are what tells letters apart.
 
-    Capital i, small l and the digit 1 are one stroke, and `rn` is drawn like `m`.
+    Capital i, small l and the digit 1 are one stroke, `rn` is drawn like `m` and `vv` like `w`.
+    Spaces tell nothing here either.
     """
-    words = "".join(c if _is_of_a_word(c) else " " for c in name.translate(_DRAWN)).split()
-    return " ".join(words).translate(_ONE_STROKE).replace("rn", "m")
+    words = [word.translate(_ONE_STROKE) for word in _words(name.translate(_DRAWN))]
+    for pair, letter in _PAIRS.items():
+        words = [word.replace(pair, letter) for word in words]
+    return "".join(words)
+
+
+def _words(name: str) -> list[str]:
+    """What stands between spaces, stops and lines."""
+    return "".join(c if _is_of_a_word(c) else " " for c in name).split()
 
 
 def _scripts(word: str) -> set[str]:

@@ -4,6 +4,7 @@ A person is an identifier and a key of that list. Names are for reading, and dec
 the list is reviewed by eye, no two may read alike and none may hide how it is written.
 """
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -103,17 +104,15 @@ def load_allow_list(root: Path) -> AllowList:
         ("id", [person.id for person in found.people]),
         ("public_key", [person.public_key for person in found.people]),
         ("emails", [mail.casefold() for person in found.people for mail in person.emails]),
-        ("name", [as_read(person.name) for person in found.people]),
-        ("name", [as_drawn(person.name) for person in found.people]),
     ):
         if len(set(values)) != len(values):
             raise ConfigError(
                 where=f"{ALLOW_LIST}: {what}",
                 found="the same value twice",
-                expected="one entry per person, key, address and name",
-                action="One person holds one role here; remove the double entry, or tell the two "
-                "apart in their names.",
+                expected="one entry per person, key and address",
+                action="One person holds one role here; remove the double entry.",
             )
+    _refuse_names_alike(found.people)
     for person in found.people:
         weakness = key_weakness(bytes.fromhex(person.public_key))
         if weakness:
@@ -124,6 +123,19 @@ def load_allow_list(root: Path) -> AllowList:
                 action="Ask the person for the key; do not copy one from elsewhere.",
             )
     return found
+
+
+def _refuse_names_alike(people: Sequence[Person]) -> None:
+    for one, other in itertools.combinations(people, 2):
+        if any(shape(one.name) == shape(other.name) for shape in (as_read, as_drawn)):
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: name",
+                found=f"the same value twice to a reader's eye, of {one.id} and {other.id}",
+                expected="names that differ by more than case, spaces, signs between letters, and "
+                "letters that look alike",
+                action="If they are two people, add a further name or where they work to one; "
+                "one person holds one role here: else remove the double entry.",
+            )
 
 
 def dependence(

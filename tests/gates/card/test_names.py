@@ -40,6 +40,8 @@ LOOKS_LIKE_ADA_LI = {
     "a stop behind it": "Ada Li.",
     "a line between": "Ada-Li",
     "a turned comma": "Ada\u02bb Li",
+    "no space": "AdaLi",
+    "a space more": "A da Li",
 }
 """Each may be the name of somebody, and none on a list that has an Ada Li."""
 
@@ -60,6 +62,8 @@ def test_a_name_that_is_written_as_it_looks_is_one(name):
 
 def test_a_hurried_reader_sees_neither_case_nor_spaces():
     assert as_read("  Rita   RAY") == as_read("rita ray") != as_read("rita roy")
+    assert as_read("RitaRay") == as_read("Rita Ray") and as_drawn("RitaRay") == as_drawn("Rita Ray")
+    assert as_read("Vvanda") == as_read("WANDA") == as_read("vVanda")
 
 
 @pytest.mark.parametrize("how", LOOKS_LIKE_ADA_LI)
@@ -70,7 +74,7 @@ def test_what_looks_like_another_name_reads_like_it(how):
 
 @pytest.mark.parametrize("one, other", [
     ("Al Ray", "AI Ray"), ("Ilya Ray", "llya Ray"), ("Kam", "Karn"), ("R. 10", "R. lO"),
-    ("Rita\u2010Ray", "Rita-Ray"),
+    ("Rita\u2010Ray", "Rita-Ray"), ("VVanda", "Wanda"), ("Evva", "Ewa"), ("AIRay", "Al Ray"),
 ])  # fmt: skip
 def test_strokes_that_are_the_same_are_drawn_alike(one, other):
     assert as_drawn(one) == as_drawn(other)
@@ -78,7 +82,8 @@ def test_strokes_that_are_the_same_are_drawn_alike(one, other):
 
 @pytest.mark.parametrize("one, other", [
     ("Rita Ray", "Rita Roy"), ("Мария", "Марина"), ("Ana", "Aña"), ("Eli Ray", "Ell Ray"),
-    ("佐藤 花子", "佐藤 桃子"), ("Ada Li", "Ida Li"),
+    ("佐藤 花子", "佐藤 桃子"), ("Ada Li", "Ida Li"), ("Eva", "Ewa"), ("Wanda", "Vanda"),
+    ("Omar Nash", "Omamash"), ("Lev Vance", "LeWance"), ("Rita Ray", "Ray Rita"),
 ])  # fmt: skip
 def test_names_that_differ_to_the_eye_stay_two(one, other):
     assert as_read(one) != as_read(other) and as_drawn(one) != as_drawn(other)

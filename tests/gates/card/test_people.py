@@ -74,6 +74,22 @@ def test_two_real_names_that_look_alike_do_not_stand_on_one_list(team, name):
         load_allow_list(team.root)
 
 
+@pytest.mark.parametrize(("one", "other"), [
+    ("Rita Ray", "RitaRay"), ("Wanda", "VVanda"), ("Kam", "Karn"),
+])  # fmt: skip
+def test_whose_names_look_alike_reads_who_they_are_and_what_to_do(team, one, other):
+    people = _people(team.root)
+    people[0]["name"], people[-1]["name"] = one, other
+    _write(team.root, people)
+    who = f"{people[0]['id']} and {people[-1]['id']}"
+    with pytest.raises(ConfigError, match=rf"twice to a reader's eye, of {who}, expected") as found:
+        load_allow_list(team.root)
+    assert "If they are two people, add a further name or where they work to one" in str(found.value)
+    people[-1]["name"] = f"{other} of Fukuoka"
+    _write(team.root, people)
+    assert load_allow_list(team.root).find(people[-1]["id"]) is not None
+
+
 def test_an_author_is_one_whatever_the_name(team):
     people = _people(team.root)
     people[-1]["name"] = "Rita of the south wing"
