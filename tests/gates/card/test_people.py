@@ -84,7 +84,7 @@ def test_whose_names_look_alike_reads_who_they_are_and_what_to_do(team, one, oth
     who = f"{people[0]['id']} and {people[-1]['id']}"
     with pytest.raises(ConfigError, match=rf"twice to a reader's eye, of {who}, expected") as found:
         load_allow_list(team.root)
-    assert "If they are two people, add a further name or where they work to one" in str(found.value)
+    assert "If they are two people, add a further name or where they work" in str(found.value)
     people[-1]["name"] = f"{other} of Fukuoka"
     _write(team.root, people)
     assert load_allow_list(team.root).find(people[-1]["id"]) is not None
