@@ -1,7 +1,8 @@
 """What you sign, on the desk: each field as seen in simulation, as proposed, and as people set it.
 
-What was not seen in simulation is not proposed: a force limit, who stands at the stop, how the
-robot is stopped and for which days are left to the people who answer for them.
+Only what rollouts were held to is proposed: a force limit, who stands at the stop, how the robot is
+stopped and for which days are left to the people who answer for them. What they were held to they
+need not have reached: where the box goes further than they did, the page says so.
 """
 
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from gates.protection import REHEARSED
 from gates.readable import human
 from gates.report import Answer, Gate, GateReport, Point
 from gates.stress.rollouts import ROLLOUTS, STRESS
+from gates.stress.visited import BEYOND
 from gates.words import SHOWN_HASH
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.documents.stress import ENVELOPE
@@ -86,6 +88,7 @@ class Signing:
         rehearsed: Why nothing of it can be signed; empty where it can.
         refusal: Why the card that lies there is refused; empty if none is.
         missing: Why nothing is shown; empty if something is.
+        beyond: Whether the box reaches beyond where rollouts of the candidate went.
     """
 
     items: tuple[Item, ...] = ()
@@ -97,6 +100,7 @@ class Signing:
     rehearsed: str = ""
     refusal: str = ""
     missing: str = ""
+    beyond: bool = False
 
     @property
     def pending(self) -> str:
@@ -154,12 +158,14 @@ def signing_of(
         return Signing(missing="the card that lies here was drafted from other reports")
     people = papers.signed.signers if papers.signed else ()
     roles = {person.role for person in people}
+    beyond = any((told := BEYOND.match(c)) and told[1] == draft.candidate for c in draft.caveats)
     items = _items(draft, papers.signed.card if papers.signed else None, reports, evidence)
     whose = {FORCE: draft.candidate, INSTEAD: _policy(reports, evidence)}
     items = tuple(replace(item, rows=_rows(item, whose, reports["D"], beside)) for item in items)
     if rehearsed(reports):
         unsigned = tuple(replace(item, yours=item.yours or UNSIGNED) for item in items)
-        return Signing(items=unsigned, caveats=len(draft.caveats), rehearsed=REHEARSED)
+        caveats = len(draft.caveats)
+        return Signing(items=unsigned, caveats=caveats, rehearsed=REHEARSED, beyond=beyond)
     open_ones = missing_fields(papers.signed.card if papers.signed else draft)
     return Signing(
         items=items,
@@ -169,6 +175,7 @@ def signing_of(
         fields=tuple(name for name in open_ones if name != "nonce" and name not in FIXED),
         undrafted=tuple(undrafted(draft)),
         refusal=papers.refusal,
+        beyond=beyond,
     )
 
 

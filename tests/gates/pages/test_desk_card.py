@@ -1,5 +1,6 @@
-"""What you sign: what was seen stands beside what is proposed, and nothing is proposed unseen."""
+"""What you sign: what was seen stands beside what is proposed, and where it reaches beyond."""
 
+import dataclasses
 import re
 import sys
 from pathlib import Path
@@ -12,10 +13,12 @@ from team import PEOPLE, Team
 
 from gates.card.signing import read_draft
 from gates.evidence import Evidence
+from gates.pages import page
 from gates.pages.desk_card import ABORTS, MISSING, NOT_PROPOSED, card_of, papers_of, signing_of
 from gates.pages.page import index_page
 from gates.pages.rows import rows_of
 from gates.report import report_bytes
+from gates.stress.visited import BEYOND
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +54,27 @@ def test_what_was_not_seen_is_not_proposed_and_left_to_people(whole, waits):
         "stop_path",
     )  # fmt: skip
     assert signing.pending == "5 signatures, 7 fields"
+
+
+@pytest.mark.parametrize("visited", [False, True])
+def test_of_a_box_that_reaches_beyond_what_was_visited_the_page_says_so(
+    copied, waits, visited, monkeypatch
+):
+    """It proposes the box that rollouts were held to, whether or not they went to its sides."""
+    papers = papers_of(waits, Evidence(copied))
+    caveats = tuple(c for c in papers.draft.caveats if not (visited and BEYOND.match(c)))
+    drafted = papers.draft.model_copy(update={"caveats": caveats})
+    papers = dataclasses.replace(papers, draft=drafted)
+    assert signing_of(waits, Evidence(copied), papers).beyond == (not visited)
+    monkeypatch.setattr(page, "papers_of", lambda reports, found: papers)
+    (copied / "reports/gate_e.json").write_bytes(report_bytes(waits["E"]))
+    text = page.index_page(copied)
+    part = text[text.index("6 · What you sign") : text.index("7 · Your part")]
+    assert "Only what rollouts were held to is proposed" in part
+    assert "not seen in simulation is not proposed" not in part
+    assert ("held to, and it reaches beyond where they went: see 1." in part) == (not visited)
+    weighed = text[text.index('<ol class="doubts">') : text.index("2 · How close")]
+    assert "<b>not visited</b>" in weighed.partition("<details")[0]
 
 
 def test_the_box_and_the_speed_stand_beside_how_far_the_commands_went(whole, waits):

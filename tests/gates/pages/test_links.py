@@ -1,4 +1,4 @@
-"""Links between pages and out of them: each leads to what lies there, in every state of a ladder."""
+"""Links between pages and out of them: each leads to what lies there, in each state of a ladder."""
 
 import html
 import re
