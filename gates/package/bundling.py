@@ -15,10 +15,10 @@ from gates.package.groups import GROUPS, contents
 from gates.package.index import BundledFile, BundledGroup, BundleIndex
 from gates.package.statements import DATASET, statement_of, statement_path
 from gates.pipeline import CODE
-from gates.proof import Rung, prove_all
+from gates.proof import Rung, prove_all, verify_report
 from gates.report import Gate, read_report
 from gates.reproducibility.settings import RELOAD
-from genpolicy.errors import BadInputError, RefusedError
+from genpolicy.errors import BadInputError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
@@ -93,19 +93,15 @@ def require_judged(root: Path) -> list[Rung]:
     """Every gate that a bundle holds, judged, and its report what the files say.
 
     Raises:
-        RefusedError: A report is missing or untrue.
+        RefusedError: A report is missing or untrue; in the words of its own proof.
+        IntegrityError: A report is malformed or of another schema version.
     """
     rungs = [rung for rung in prove_all(root) if rung.gate in BUNDLED]
+    hashes: dict[Gate, str] = {}
     for rung in rungs:
         if rung.verdict in ("REFUSED", "NOT JUDGED"):
-            raise RefusedError(
-                gate=rung.gate,
-                criterion="the report",
-                measured=rung.note,
-                limit="a report that is what the files say",
-                report=rung.report,
-                action="A bundle holds evidence of gates A to D, all judged.",
-            )
+            verify_report(root, rung.gate, upstream=hashes)  # raises what it said, as it said it
+        hashes[rung.gate] = sha256_file(root / rung.report)
     return rungs
 
 

@@ -4,6 +4,7 @@ That a bundle of a real ladder is proved elsewhere, and that no forged one is: t
 """
 
 import json
+import shutil
 import zipfile
 
 import pytest
@@ -12,8 +13,10 @@ from gates.package import bundling
 from gates.package.archive import read_index
 from gates.package.bundling import package
 from gates.package.statements import statement_path
-from gates.report import Overridden, read_report, report_path
+from gates.proof import prove_all
+from gates.report import Overridden, read_report, report_bytes, report_path
 from genpolicy.errors import BadInputError, ConfigError, RefusedError
+from genpolicy.integrity.atomic import write_bytes
 
 
 def test_a_bundle_names_groups_verdicts_and_statements(whole, tmp_path):
@@ -38,9 +41,37 @@ def test_by_default_its_name_has_the_address(whole):
 @pytest.mark.parametrize("gate", ["A", "B", "C", "D"])
 def test_without_a_report_there_is_no_bundle(whole, tmp_path, gate):
     (whole / report_path(gate)).unlink()
-    with pytest.raises(RefusedError, match=r"Gate [A-D] refuses: the report"):
+    with pytest.raises(RefusedError, match=rf"^Gate {gate} refuses: report is missing, required a"):
         package(whole, "flow", tmp_path / "flow.zip")
     assert not (tmp_path / "flow.zip").exists()
+
+
+def _without_evidence(root):
+    shutil.rmtree(root / "artifacts")
+
+
+def _with_another_report_below(root):
+    path = root / report_path("B")
+    write_bytes(path, report_bytes(read_report(root, "B")[0].model_copy(update={"decision": "x"})))
+
+
+def _with_another_file(root):
+    (root / "artifacts/audit/more.parquet").write_bytes(b"")
+
+
+@pytest.mark.parametrize(("harm", "said"), [
+    (_without_evidence, "Gate A refuses: sha256 of artifacts/"),
+    (_with_another_report_below, "Gate B refuses: "),
+    (_with_another_file, "Gate A refuses: artifacts/audit/more.parquet is a file that nobody"),
+])  # fmt: skip
+def test_what_a_gate_refuses_is_said_once_and_as_the_gate_says_it(whole, tmp_path, harm, said):
+    """A clone has the reports and none of the evidence: one reads what to run."""
+    harm(whole)
+    with pytest.raises(RefusedError) as found:
+        package(whole, "flow", tmp_path / "flow.zip")
+    assert str(found.value).startswith(said) and "dvc repro" in str(found.value)
+    assert all(line.count("refuses:") == 1 for line in str(found.value).splitlines())
+    assert str(found.value) in {rung.note for rung in prove_all(whole)}
 
 
 def test_evidence_that_was_changed_has_no_bundle(whole, tmp_path):
