@@ -4,7 +4,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gates.stated import Row, compare_keys, compare_rows, root_seed, section, training_seed
+from gates.stated import (
+    Row,
+    compare_keys,
+    compare_rows,
+    refuse,
+    root_seed,
+    section,
+    training_seed,
+)
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
@@ -12,14 +20,16 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.gallery import GALLERY, Gallery
 from genpolicy.evidence.documents.shadow import MUTANTS, Mutant
 from genpolicy.evidence.rows.shadow import CandidateRow
-from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
+from genpolicy.evidence.shadow.candidate_rows import HASHED, numbers_sha256
 from genpolicy.evidence.shadow.gallery import gallery_of
+from genpolicy.evidence.shadow.layer_margins import Gauges, columns_of, gauges_of, judged_again
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import Observation, held_out_observations, spread
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.evidence.shadow.shadow import Shadow
 from genpolicy.evidence.shadow.tables import all_mutants
 from genpolicy.execution.cell import Cell, ExecutionSettings
+from genpolicy.feasibility.reasons import Reason
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
@@ -32,8 +42,8 @@ SHADOW = "artifacts/shadow"
 JOURNAL = "journal.mcap"
 CANDIDATES = "candidates"
 DATASET = "artifacts/ingest"
-HASHED = ("raw", "projected")
-"""Columns that a journal states by their hash."""
+OFFENDING = "row_"
+"""Begins the columns that no margin tells: which action offends."""
 
 
 class TaskSection(Settings):
@@ -46,11 +56,12 @@ def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
     """Hold the tables of the shadow test against its journal, and ask the layers again.
 
     Its mutants are tried again, and the examples of its gallery chosen, judged and drawn up again
-    from the table and the dataset. That a policy drew those actions is asked in `rederive_draws`.
+    from the table and the dataset. What a row states of each layer must follow from the margins of
+    its checks. That a policy drew those actions is asked in `rederive_draws`.
 
     Raises:
-        RefusedError: A row is not what the journal says, or a mutant or an example is not what is
-            found again.
+        RefusedError: A row is not what the journal says or its margins give, or a mutant or an
+            example is not what is found again.
         IntegrityError: A file is missing or no regular file, or the layers say something else of
             an example than its row.
         BadInputError: A file cannot be read.
@@ -67,6 +78,7 @@ def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
     stated_mutants, found = (_by_check(rows) for rows in (MUTANTS.read(root / SHADOW), again))
     compare_keys("C", path, stated_mutants, found, "as tried again")
     rows = read_rows(root / SHADOW / f"{CANDIDATES}.parquet", CandidateRow)
+    _hold_margins(rows, gauges_of(tried.checker))
     shown, drawn = GALLERY.read(root / SHADOW), gallery_of(tried, observations, rows)
     path = f"{SHADOW}/{GALLERY.file}"
     compare_keys("C", path, _by_example(shown), _by_example(drawn), "as judged again")
@@ -76,6 +88,25 @@ def _hashed(row: dict[str, Any]) -> Row:
     """A row of a table, with its long columns as a journal states them."""
     short = {key: value for key, value in row.items() if key not in HASHED}
     return short | {f"{key}_sha256": numbers_sha256(row[key]) for key in HASHED if key in row}
+
+
+def _hold_margins(rows: Sequence[CandidateRow], gauges: Gauges) -> None:
+    """What each row states of its layers is what the margins of all checks give, by the limits.
+
+    Raises:
+        RefusedError: It is not, or they are not those of all checks.
+    """
+    for row in rows:
+        where = f"candidate {row.method}/{row.fixture}/{row.observation}/{row.candidate}"
+        if len(row.margins) != len(Reason):
+            refuse(
+                "C", f"{where}: margins", f"{len(row.margins)}", f"those of {len(Reason)} checks"
+            )
+        for column, value in columns_of(judged_again(row.margins, gauges)).items():
+            stated = getattr(row, column)
+            if stated != value and not column.startswith(OFFENDING):
+                text = f"{value!r}, as the margins of its checks give"
+                refuse("C", f"{where}: {column}", f"{stated!r}", text)
 
 
 def _by_check(rows: Sequence[Mutant]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from gates.bounds import counted_interval, share_interval, upper_quantile, wides
 from gates.criterion import Measured, criterion
 from gates.doubt import NEVER_ASKED
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
+from gates.feasibility.margins import require_consistent
 from gates.feasibility.settings import (
     CANDIDATES,
     HELD_OUT,
@@ -37,7 +38,10 @@ REFUSED_BY_NAME = (NotAll(ADMISSIBLE), is_one("first_reason", *REASONS))
 
 
 def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
-    return evidence.of(CANDIDATES, CandidateRow, candidate)
+    return evidence.once(
+        ("candidates", candidate),
+        lambda: require_consistent(evidence.of(CANDIDATES, CandidateRow, candidate)),
+    )
 
 
 def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:

@@ -14,8 +14,9 @@ REASONS = tuple(
     name for layer, _, name in (row.partition(".") for row in CHECKS_ASKED_FOR) if layer in LAYERS
 )
 """Why a layer may reject: the checks of the six layers, and nothing else."""
-PASSED, UNKNOWN = "passed", "unknown"
-"""What came of a candidate: passed by all layers, or a check could not be evaluated."""
+PASSED, FAILED, UNKNOWN, NOT_REACHED = "passed", "failed", "unknown", "not_reached"
+"""What came of a layer, and but for the last of a candidate: a check that could not be evaluated
+is unknown, and a layer behind one that rejected was not reached."""
 HELD_OUT = "held_out"
 TWO_MODES = "two_modes"
 INTACT = (HELD_OUT, TWO_MODES)

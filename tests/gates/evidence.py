@@ -15,6 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import watched
 import yaml
+from layered import as_the_layers_say, said_of
 from watched import write_watched
 
 from gates import pipeline
@@ -422,6 +423,8 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     frame = change(before.copy())
     if path == "stress/rollouts.parquet":
         frame = ended_as_it_counts(before, frame)
+    if path == "shadow/candidates.parquet":
+        frame = as_the_layers_say(before, frame)
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
     if path == "stress/rollouts.parquet" and not {"recovery_attempted", "recovered"} - set(frame):
         table(root, "stress/recoveries.parquet", RecoveryRow, recoveries_of(frame))
@@ -1476,11 +1479,10 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "outcome": "passed" if held else "failed",
         "first_reason": "" if held else broken,
         "first_row": None if held else 2,
-        "layer_margin": 0.1,
-        "margin_unit": "m" if held else "rad/s^3",
         "position_change_m": 0.001 * (1 + candidate) if held else None,
         "rotation_change_rad": 0.01,
         "boundary_jerk_m_s3": 50.0 + observation if held else None,
+        "margins": [0.0] * len(FEASIBILITY_CHECKS),
         "raw": [0.0, 1.0],
         "projected": [0.0, 1.0],
     }
@@ -1497,18 +1499,15 @@ STILL = [
 
 
 def _shadow(root: Path) -> None:
-    table(
-        root,
-        "shadow/candidates.parquet",
-        CandidateRow,
-        [
-            _candidate(m, fixture, o, c)
-            for m in CANDIDATES
-            for fixture in FIXTURES
-            for o in range({"held_out": 80, "two_modes": 60}.get(fixture, 4))
-            for c in range(4)
-        ],
-    )
+    rows = [
+        _candidate(m, fixture, o, c)
+        for m in CANDIDATES
+        for fixture in FIXTURES
+        for o in range({"held_out": 80, "two_modes": 60}.get(fixture, 4))
+        for c in range(4)
+    ]
+    stated = said_of(pd.DataFrame(rows, dtype=object)).to_dict("records")
+    table(root, "shadow/candidates.parquet", CandidateRow, stated)
     table(
         root,
         "shadow/stub.parquet",

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,13 +23,14 @@ from genpolicy.evidence.rows.shadow import (
     ShadowStubRow,
 )
 from genpolicy.evidence.shadow.gallery import gallery_of
+from genpolicy.evidence.shadow.layer_margins import gauges_of
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import write_shadow
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import Journal, write_journal
-from genpolicy.integrity.rows import write_rows
+from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.seeds import stream
 from genpolicy.verification.shadow import KEYS
@@ -153,9 +155,12 @@ def test_true_evidence_stands(root):
 
 FORGED = {
     "dynamic": False, "outcome": "unknown", "first_reason": "expired", "first_row": 15,
-    "mode": "left", "layer_margin": 9.0, "margin_unit": "s",
+    "mode": "left", "layer_margin": 9.0, "margin_unit": "kg",
     "position_change_m": 0.0001, "rotation_change_rad": 0.5, "boundary_jerk_m_s3": 1.0,
     "phase": "release", "situation": "elsewhere:1", "seed": 77,
+    "margin_layer": "fresh", "margin_check": "expired", "outcome_contact": "unknown",
+    "check_kinematic": "singular", "margin_kinematic": 0.9, "unit_kinematic": "m",
+    "share_kinematic": 0.9, "row_kinematic": 3,
 }  # fmt: skip
 
 
@@ -171,13 +176,57 @@ def test_a_forged_cell_of_a_candidate_is_refused_by_name(root, column, fixture):
         rederive(root, "C")
 
 
-@pytest.mark.parametrize("column", ["raw", "projected"])
+@pytest.mark.parametrize("column", ["raw", "projected", "margins"])
 def test_forged_actions_of_a_candidate_are_refused(root, column):
     rows = rows_of(root, "candidates")
     rows[0][column] = [rows[0][column][0] + 1e-9, *rows[0][column][1:]]
     write(root, "candidates", rows)
     with pytest.raises(RefusedError, match=rf"candidate operator/\w+/0/0: {column}_sha256 is"):
         rederive(root, "C")
+
+
+WIDER = {
+    "margin_kinematic": 0.9, "share_kinematic": 0.9, "check_kinematic": "singular",
+    "unit_kinematic": "1", "outcome_kinematic": "failed",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("column", WIDER)
+def test_what_a_layer_states_follows_from_the_margins_of_its_checks(root, moments, column):
+    """Whoever forges the journal too forges the margins of all checks, or is found here."""
+    rows = read_rows(root / SHADOW / "candidates.parquet", CandidateRow)
+    gauges = gauges_of(moments[0].checker)
+    module._hold_margins(rows, gauges)
+    own = replace(rows[0], **{column: WIDER[column]})
+    said = rf"operator/\w+/0/0: {column} is {WIDER[column]!r}.* as the margins of its checks give"
+    with pytest.raises(RefusedError, match=said):
+        module._hold_margins([own], gauges)
+
+
+def test_margins_of_fewer_checks_are_refused(root, moments):
+    rows = read_rows(root / SHADOW / "candidates.parquet", CandidateRow)
+    short = replace(rows[0], margins=rows[0].margins[:-1])
+    with pytest.raises(RefusedError, match=r"margins is 40, .*those of 41 checks"):
+        module._hold_margins([short], gauges_of(moments[0].checker))
+
+
+def test_a_limit_that_is_another_now_is_found(root, moments):
+    """A share is of the limit in force; what was judged by another one has other shares."""
+    rows = read_rows(root / SHADOW / "candidates.parquet", CandidateRow)
+    gauges = gauges_of(moments[0].checker)
+    wider = {
+        layer: {name: replace(gauge, scale=2 * gauge.scale) for name, gauge in own.items()}
+        for layer, own in gauges.items()
+    }
+    with pytest.raises(RefusedError, match="share_"):
+        module._hold_margins(rows, wider)
+
+
+def test_the_margins_are_held_where_a_report_is_verified(root, monkeypatch):
+    held = []
+    monkeypatch.setattr(module, "_hold_margins", lambda rows, gauges: held.extend(rows))
+    rederive(root, "C")
+    assert len(held) == len(rows_of(root, "candidates"))
 
 
 @pytest.mark.parametrize(("name", "column"), [

@@ -9,12 +9,31 @@ import numpy as np
 from genpolicy.contract.action import POSITION
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.case import Case
+from genpolicy.evidence.shadow.layer_margins import (
+    LayerMargin,
+    columns_of,
+    decides,
+    gauges_of,
+    in_order,
+    layer_margins,
+)
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.settings import LAYERS
-from genpolicy.feasibility.verdict import LayerOutcome, LayerVerdict, Verdict
+from genpolicy.feasibility.verdict import LayerOutcome, Verdict
 from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.integrity.rows import columns_of as names_of
 from genpolicy.tasks.api import Task
+
+HASHED = ("margins", "raw", "projected")
+"""Columns that a journal states by their hash."""
+IN_THE_VERDICT = (
+    "method", "seed", "fixture", "situation", "phase", "observation", "candidate", "first_reason",
+    *LAYERS,
+)  # fmt: skip
+"""Columns that a journal states elsewhere, or that no journal names."""
+MEASURED = tuple(name for name in names_of(CandidateRow) if name not in (*IN_THE_VERDICT, *HASHED))
+"""Columns that it states beside the verdict."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +74,14 @@ def candidate_row(
     """
     item, projected, raw = labels.item, result.projected, case.proposal.actions
     verdict = checker.located(projected, result.verdict, context=case.context)
-    decided = verdict.first or _tightest(verdict)
+    found = layer_margins(verdict, gauges_of(checker))
+    layer = decides(found)
+    decided = found.get(layer, LayerMargin(str(LayerOutcome.PASSED)))
     mode = "none"
     if np.all(np.isfinite(raw)):
         mode = task.mode_of(raw[:, POSITION], item.history[-1])
     jerk = checker.boundary_jerk_m_s3(projected, context=case.context)
-    passed = {layer.name: layer.passed for layer in verdict.layers}
+    passed: dict[str, Any] = {layer.name: layer.passed for layer in verdict.layers}
     return CandidateRow(
         method=case.proposal.metadata.method,
         seed=labels.seed,
@@ -74,11 +95,15 @@ def candidate_row(
         outcome=str(LayerOutcome.PASSED if verdict.first is None else verdict.first.outcome),
         first_reason=str(verdict.first_reason or ""),
         first_row=decided.row,
-        layer_margin=_finite(decided.margin),
-        margin_unit=str(decided.unit or ""),
+        margin_layer=layer,
+        margin_check=decided.check,
+        layer_margin=decided.margin,
+        margin_unit=decided.unit,
         position_change_m=_finite(projected.position_change_m),
         rotation_change_rad=_finite(projected.rotation_change_rad),
         boundary_jerk_m_s3=_finite(jerk),
+        **columns_of(found),
+        margins=in_order(verdict.margins),
         raw=tuple(raw.ravel().tolist()),
         projected=tuple(projected.actions.ravel().tolist()),
     )
@@ -86,18 +111,8 @@ def candidate_row(
 
 def measures_of(row: CandidateRow) -> dict[str, Any]:
     """What a row states beside the verdict, for the journal; arrays by their hash."""
-    return {
-        "mode": row.mode,
-        "outcome": row.outcome,
-        "first_row": row.first_row,
-        "layer_margin": row.layer_margin,
-        "margin_unit": row.margin_unit,
-        "position_change_m": row.position_change_m,
-        "rotation_change_rad": row.rotation_change_rad,
-        "boundary_jerk_m_s3": row.boundary_jerk_m_s3,
-        "raw_sha256": numbers_sha256(row.raw),
-        "projected_sha256": numbers_sha256(row.projected),
-    }
+    plain = {name: getattr(row, name) for name in MEASURED}
+    return plain | {f"{name}_sha256": numbers_sha256(getattr(row, name)) for name in HASHED}
 
 
 def numbers_sha256(values: Sequence[float]) -> str:
@@ -110,11 +125,6 @@ def numbers_sha256(values: Sequence[float]) -> str:
 def touching_of(verdict: Verdict) -> list[str]:
     """Names of the two shapes that a refused verdict says touch; empty where it names none."""
     return verdict.detail.partition(" at row ")[0].split(" and ") if verdict.detail else []
-
-
-def _tightest(verdict: Verdict) -> LayerVerdict:
-    """The layer with the smallest margin that is a number; of a chunk that passed."""
-    return min(verdict.layers, key=lambda v: v.margin if np.isfinite(v.margin) else np.inf)
 
 
 def _finite(value: float) -> float | None:
