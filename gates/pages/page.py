@@ -35,6 +35,7 @@ from gates.pages import (
     tables_feasibility,
     tables_holds,
     tables_machine,
+    tables_margins,
     tables_matching,
     tables_monitors,
     tables_overruns,
@@ -96,6 +97,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     "C": (
         *plots_feasibility.PLOTS,
         *tables_feasibility.LISTINGS,
+        *tables_margins.LISTINGS,
         *tables_survival.LISTINGS,
         *plots_rejected.GALLERIES,
         *plots_incidents.PLOTS,

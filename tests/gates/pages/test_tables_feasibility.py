@@ -94,6 +94,7 @@ def test_the_page_shows_the_table_and_folds_the_rest(copied, judged):
     assert found == [
         "Every phase with every mode (5)", "Reasons that rejected nothing (39)",
         "What corrupted fixtures were to be refused for, and were (5)",
+        "Every check that was the closest (10)",
         "Every condition (30)", "Every phase (12)",
     ]  # fmt: skip
 
