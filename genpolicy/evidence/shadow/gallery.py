@@ -99,6 +99,10 @@ def _example(
     if (told.reason, told.row) != (row.first_reason, row.first_row):
         said = f"what the layers say: {told.reason} at action {told.row}"
         raise _another(where, f"rejected for {row.first_reason} at action {row.first_row}", said)
+    margin = float(told.margin) if np.isfinite(told.margin) else None
+    if (row.margin_layer, row.layer_margin) != (told.name, margin):
+        said = f"what the layers say: {margin} in {told.name}"
+        raise _another(where, f"with a margin of {row.layer_margin} in {row.margin_layer}", said)
     touching = touching_of(verdict)
     unit, limits = _quantity(told, projected, case.context, cell)
     return RejectedExample(
@@ -115,7 +119,7 @@ def _example(
         candidate=row.candidate,
         row=told.row,
         late_rows=case.context.first_index,
-        margin=float(told.margin) if np.isfinite(told.margin) else None,
+        margin=margin,
         unit=str(unit),
         limits=limits,
         touching=touching,

@@ -155,6 +155,9 @@ def test_it_is_a_document_that_is_read_back(gallery, tmp_path):
 @pytest.mark.parametrize(("changes", "said"), [
     ({"first_reason": "joint_jerk"}, "rejected for joint_jerk"), ({"first_row": 9}, "at action 9"),
     ({"observation": 99}, "of observation 99, expected one of 4"),
+    ({"layer_margin": -0.5}, "with a margin of -0.5 in representation"),
+    ({"layer_margin": None}, "with a margin of None in representation"),
+    ({"margin_layer": "contact"}, "in contact, expected what the layers say: -0.1.* in repr"),
 ])  # fmt: skip
 def test_a_row_of_which_the_layers_say_something_else_is_refused(shadow, few, rows, changes, said):
     one = next(r for r in rows if (r.fixture, r.first_reason) == (HELD_OUT, "gripper_range"))
