@@ -2,6 +2,7 @@
 
 import textwrap
 
+from gates.planned_blocks import Saved
 from gates.planned_power import MOST_STARTS, Gain, Stated
 from gates.planning import Plan
 from genpolicy.contract.planner import PLANNER
@@ -37,6 +38,7 @@ def plan_text(plan: Plan) -> str:
         f"Smallest gain that is found in {plan.power:.0%} of trials with {plan.starts} starts",
         *(_gain_text(gain) for gain in plan.gains),
     ]
+    lines += _saved_text(plan)
     open_ = [name for name in plan.undecidable if name not in plan.failing]
     if plan.failing:
         lines += _warned(
@@ -112,6 +114,25 @@ def _weighed_text(plan: Plan) -> list[str]:
         "rollout; all else is 0. Margin, effect and gains are of utility, and outcomes are taken "
         "as 0 or 1, the hardest of their means. Is the effect one of success, and costs every "
         f"success all that it can, it is found in {plan.stated.dearest_share:.0%}."
+    )
+
+
+def _saved_text(plan: Plan) -> list[str]:
+    """How far candidates run where who can no longer pass is stopped."""
+    if plan.block is None:
+        return []
+    return [
+        "",
+        f"Stopped where it can no longer pass, asked every {plan.block} starts (stress.block):",
+        *(_ran_text(saved) for saved in plan.saved),
+        "  and whoever stays in, with the simple methods beside it, runs them all",
+    ]
+
+
+def _ran_text(saved: Saved) -> str:
+    return (
+        f"  {saved.what}, {saved.candidate_success:.0%}: runs {saved.ran_share:.0%} of the starts "
+        f"on average, stopped in {saved.stopped_share:.0%}"
     )
 
 

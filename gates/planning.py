@@ -17,7 +17,9 @@ import scipy
 
 from gates.bounds import counted_interval, draws_for_quantile
 from gates.evidence import MissingEvidenceError
+from gates.planned_blocks import Saved, saved_by_blocks
 from gates.planned_power import Gain, Stated, smallest_gains, stated_effect
+from gates.protection import is_rehearsal
 from gates.report import stage_of
 from gates.settings import Limits, read_limits, read_params, read_settings
 from gates.stated import section
@@ -95,6 +97,8 @@ class Plan:
         stated: The effect that the plan is for.
         bounds: By criterion, in the order of the gate.
         gains: By assumed baseline.
+        block: Starts of a block; None where all starts are one.
+        saved: How far candidates run in blocks, by what they are worth; empty likewise.
     """
 
     starts: int
@@ -117,6 +121,8 @@ class Plan:
     stated: Stated
     bounds: tuple[Bound, ...]
     gains: tuple[Gain, ...]
+    block: int | None
+    saved: tuple[Saved, ...]
 
     @property
     def undecidable(self) -> tuple[str, ...]:
@@ -142,7 +148,7 @@ def plan_of(root: Path) -> Plan:
     params = read_params(root)
     settings = read_settings(params, stage_of("D"), StressSettings)
     limits = read_limits(params, "D", GATE.criteria)
-    settings = settings.under(limits)
+    settings = settings.under(replace(limits, rehearsed=is_rehearsal(params)))
     planned = section(params, "stress", StressSection)
     methods = dict.fromkeys([*settings.candidates, *settings.baselines])
     of_condition = len(methods) * settings.planned_starts
@@ -180,6 +186,8 @@ def plan_of(root: Path) -> Plan:
         stated=stated_effect(settings, table, power),
         bounds=tuple(_bounds(settings, limits, table)),
         gains=tuple(smallest_gains(settings, power)),
+        block=None if settings.rule is None else settings.rule.block,
+        saved=saved_by_blocks(settings),
     )
 
 

@@ -15,6 +15,7 @@ from gates.card.searched import FAILURE_SEARCH
 from gates.pages.printing import differing
 from gates.proof import Rung
 from gates.rederive_audit import rederive_audit
+from gates.rederive_blocks import rederive_blocks
 from gates.rederive_brought import rederive_brought
 from gates.rederive_checked import rederive_checked
 from gates.rederive_clocks import rederive_clocks
@@ -167,6 +168,7 @@ def _evidence(root: Path, gate: Gate) -> None:
         _envelope(root, params)
         _power(root, params)
         _further_trainings(root, params, held_to)
+        rederive_blocks(root, params, list(seed_folders(root, params).values()))
 
 
 def _printed(root: Path, gate: Gate) -> None:

@@ -13,11 +13,12 @@ from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import SEVERITIES, SeverityRow
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
+from genpolicy.evidence.stress.planned_blocks import planned_rule, weighed
 from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import plan_shards, write_stress
-from genpolicy.evidence.stress.trainings import of_training
+from genpolicy.evidence.stress.trainings import as_far, of_training
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -25,7 +26,7 @@ from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
-from stages._limits import require_pinned_limits
+from stages._limits import REHEARSAL, require_pinned_limits
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
@@ -35,7 +36,7 @@ def work(params: Params) -> None:
 
     What was trained with several seeds runs with each, the first in the folder of the stage and
     every other one in a folder of its own, so that no row of another training is among those that
-    promotion is judged by.
+    promotion is judged by. Where starts are run in blocks, the first says how far each goes.
     """
     admitted = admit("stress", Path.cwd()).candidates
     require_one_contract("train_baselines", "train_generators", dataset=False)
@@ -71,18 +72,28 @@ def work(params: Params) -> None:
     registered = len(trained) + len(brought)
     latency = latency_models(table, timing.declared_terms)
     power = power_document(section, candidates=registered, root_seed=params.seed)
+    rule = planned_rule(
+        starts=section.starts, block=section.block, conditions=list(section.perturbations),
+        simple=section.baselines, margin=section.margin, alpha=section.alpha_of_each(registered),
+        rehearsal=params.raw.get(REHEARSAL) is True,
+        costs=weighed(params.raw.get("gate_d")),
+    )  # fmt: skip
     with output_folder(ARTIFACTS / "stress") as folder:
         runs = {folder: judged}
         runs |= {folder / folder_of_seed(number): of_training(judged, number) for number in further}
+        ran: dict[str, int] = {}
         for place, compared in runs.items():
             place.mkdir(parents=True, exist_ok=True)
             shards = plan_shards(
                 comparison, compared, section.conditions, latency=latency,
                 journals=place / "journals",
             )  # fmt: skip
-            write_stress(
-                place, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
-            )
+            shards = as_far(shards, ran) if ran else shards
+            told = write_stress(
+                place, shards, workers=params.compute.workers,
+                scheduler=params.compute.scheduler, rule=None if ran else rule,
+            )  # fmt: skip
+            ran = ran if rule is None else ran or told
         POWER.write(folder, power)
         if further:
             TRAININGS.write(folder, Trainings(seeds=further))

@@ -22,7 +22,9 @@ from gates.stress.gate import GATE
 from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import INVOCATIONS, JOURNALS, ROLLOUTS, STRESS, StressSettings
 from gates.stress.weights import DURATION, LEAST_OF_A_SUCCESS, by_cost
-from genpolicy.evidence.documents.stress import POWER
+from genpolicy.evidence.documents.stress import BLOCKS, POWER, Blocks
+from genpolicy.evidence.stress.planned_blocks import Rule
+from genpolicy.evidence.stress.possible import blocks_document, due, seen_of
 from genpolicy.integrity.documents import canonical_json
 
 TICKS, ASKED, LASTED_S = 160, 20, 8.0
@@ -62,11 +64,28 @@ class Tables(Evidence):
 def judged(
     drawn: Drawn, settings: StressSettings, limits: Limits, power: object, rng: np.random.Generator
 ) -> GateReport:
-    """The report of Gate D on one trial."""
+    """The report of Gate D on one trial; where it is planned in blocks, of what is run then."""
     tables = _tables(drawn, settings, rng)
     documents = {f"{STRESS}/{POWER.file}": power, f"{STRESS}/checker.json": _checked()}
+    if settings.rule is not None:
+        tables, blocks = in_blocks(tables, settings.rule)
+        documents[f"{STRESS}/{BLOCKS.file}"] = BLOCKS.plain(blocks)
     evidence = Tables(tables, documents)
     return judge(GATE, evidence, limits, settings, candidates=settings.candidates)
+
+
+def in_blocks(tables: Mapping[str, pa.Table], rule: Rule) -> tuple[dict[str, pa.Table], Blocks]:
+    """The rows that a stage would have written in blocks, and what it would say of them."""
+    frames = {path: table.to_pandas() for path, table in tables.items()}
+    seen = seen_of(frames[ROLLOUTS].itertuples(index=False), rule)
+    ran = due(rule, seen, [name for name in seen if name not in rule.simple])
+    kept = {
+        path: frame[frame["start"] < frame["method"].map(ran)] if "start" in frame else frame
+        for path, frame in frames.items()
+    }
+    seen = seen_of(kept[ROLLOUTS].itertuples(index=False), rule)
+    found = {path: pa.Table.from_pandas(of, preserve_index=False) for path, of in kept.items()}
+    return found, blocks_document(rule, seen)
 
 
 def _tables(

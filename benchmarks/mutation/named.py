@@ -136,7 +136,7 @@ NAMED = (
     Named("an unfinished rollout is a success", ROLLOUTS, "    if len(differ):", "    if False:"),
     Named("a condition that nobody met", ROLLOUTS, "    if absent:", "    if False:"),
     Named("fewer starts than planned", ROLLOUTS,
-          "if int(per_condition.min()) < settings.planned_starts:", "if False:"),
+          "if int(per_condition.min()) < planned:", "if False:"),
     Named("any row of a chunk is taken", STUB,
           "return bytes_of(action) == bytes_of(admitted.actions[row])", "return True"),
     Named("a new session keeps old observations", STUB,

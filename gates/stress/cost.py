@@ -32,6 +32,7 @@ from gates.stress.rollouts import (
     rollouts,
     success_lower,
 )
+from gates.stress.stopped import stopped_by
 from gates.words import duration, number, percent, three
 from genpolicy.evidence.documents.stress import DISTILLED
 from genpolicy.evidence.rows.stress import FaultRow, InvocationRow
@@ -220,6 +221,8 @@ def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: 
 
     Where people had the arm, their time for each success of the policy is said beside it.
     """
+    if stopped := stopped_by(evidence, settings, candidate, "intervention_upper"):
+        return stopped
     rows = rollouts(evidence, settings, candidate)
     counts(rows, "interventions")  # refused where one is below none
     found = _rollouts_with(rows, STEPPED_IN, settings)
@@ -248,6 +251,8 @@ def _persons_time(rows: pd.DataFrame) -> str:
 )
 def reset_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of rollouts that end in a protective stop."""
+    if stopped := stopped_by(evidence, settings, candidate, "reset_upper"):
+        return stopped
     rows = rollouts(evidence, settings, candidate)
     if rows["outcome"].eq("").any():
         raise MissingEvidenceError("a rollout has no outcome")
@@ -325,5 +330,7 @@ def stress_success_lower(evidence: Evidence, settings: StressSettings, candidate
     Conditions that are milder or harder than the planned ones are shown beside it, not judged.
     """
     evidence.bind(CURVES)
+    if stopped := stopped_by(evidence, settings, candidate, "stress_success_lower"):
+        return stopped
     conditions = [name for name in settings.perturbations if name != NOMINAL]
     return success_lower(evidence, settings, candidate, conditions)

@@ -23,11 +23,14 @@ from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.planned import planner_said
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings
+from gates.stress.stopped import stopped_by
+from gates.stress.stopping import stopped_said
 from gates.stress.trainings import trainings_said
 from gates.stress.utility import mean_worths
 from gates.stress.visited import visited_said
 from gates.stress.weights import listed
 from gates.words import points
+from genpolicy.evidence.stress.possible import GAIN
 
 AVERAGED = (
     "Starts are the unit of independence; conditions and seeds of one start are averaged, and "
@@ -49,8 +52,11 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
 
     It averages conditions, and a card allows one of them: without a gain that is shown inside the
     envelope there is nothing to promote, whatever is gained elsewhere. A loss that is shown there
-    is what is measured; where neither is shown, more starts decide.
+    is what is measured; where neither is shown, more starts decide. Of a candidate that was
+    stopped, since it could show no gain any more, it is the most that it could have shown.
     """
+    if stopped := stopped_by(evidence, settings, candidate, GAIN):
+        return stopped
     differences = {
         baseline: paired_differences(evidence, settings, candidate, baseline)
         for baseline in settings.baselines
@@ -100,8 +106,8 @@ def _decide(judged: Judged) -> Decision:
 
 
 def _said(judged: Judged) -> list[str]:
-    """Of the planner, of what was never touched or visited, of clocks, and of monitors."""
-    beside = (planner_said, contact_said, visited_said, clocks_said, monitors_said)
+    """Of who was stopped, the planner, what was never touched or visited, clocks, monitors."""
+    beside = (stopped_said, planner_said, contact_said, visited_said, clocks_said, monitors_said)
     return [text for of in (trainings_said, *beside) for text in of(judged)]
 
 

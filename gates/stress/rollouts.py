@@ -1,10 +1,10 @@
 """Rollouts of the matched comparison, and the settings of Gate D that say which must be there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import pandas as pd
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from gates.again import CHANGED
 from gates.bounds import share_interval
@@ -13,10 +13,12 @@ from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.recount import Subset, Term, is_one, part_said, part_share
 from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
+from gates.stress.stopped import starts_of
 from gates.stress.weights import Weights, explained, require_weights
 from gates.words import percent
 from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
+from genpolicy.evidence.stress.planned_blocks import UNWEIGHED, Rule, planned_rule
 
 STRESS = "artifacts/stress"
 ROLLED = "rollouts.parquet"
@@ -50,6 +52,15 @@ SUCCEEDED = is_one("success", True)
 """Of a rollout."""
 
 
+def _block_of(value: Any) -> Any:
+    """What the section `stress` says of blocks, which it may leave out."""
+    return value.get("block") if isinstance(value, Mapping) else value
+
+
+def _unset(value: object) -> bool:
+    return value is None
+
+
 def _of_one_training(seeds: tuple[int, ...]) -> bool:
     return len(seeds) < 2
 
@@ -63,6 +74,8 @@ class StressSettings(CandidateSettings):
         margin: Gain to be shown, in what is compared (`measure`).
         family_alpha: Probability of any wrong promotion.
         planned_starts: Starts planned; fewer recorded ones leave the gate without a verdict.
+        block: Starts after which candidates that can no longer pass are stopped; None, or not below
+            `planned_starts`: all run all. Left out of a report where it is not planned.
         planned_effect: What baseline and candidate are worth, success or utility, that the test
             must be able to tell apart.
         episode_limit_s: Longest rollout, s.
@@ -84,6 +97,7 @@ class StressSettings(CandidateSettings):
         "margin": "stress.margin",
         "family_alpha": "stress.alpha",
         "planned_starts": "stress.starts",
+        "block": "stress",
         "planned_effect": "stress.planned_effect",
         "episode_limit_s": "stress.episode_limit_s",
         "execution_horizon": "horizons.execution_horizon",
@@ -92,7 +106,7 @@ class StressSettings(CandidateSettings):
         "unmatched": "gate_b.unmatched",
         "seeds": "policy.seeds",
     }
-    whole: ClassVar[frozenset[str]] = frozenset({"maximum_age_s"})
+    whole: ClassVar[frozenset[str]] = frozenset({"maximum_age_s", "block"})
 
     candidates: tuple[str, ...] = Field(min_length=1)
     baselines: tuple[str, ...] = Field(min_length=1)
@@ -100,6 +114,9 @@ class StressSettings(CandidateSettings):
     margin: float = Field(gt=-1.0, lt=1.0)
     family_alpha: float = Field(gt=0.0, lt=1.0)
     planned_starts: int = Field(gt=0)
+    block: Annotated[int | None, BeforeValidator(_block_of)] = Field(
+        default=None, ge=1, exclude_if=_unset
+    )
     planned_effect: tuple[float, float]
     episode_limit_s: float = Field(gt=0.0)
     execution_horizon: int = Field(gt=0)
@@ -169,6 +186,25 @@ class StressSettings(CandidateSettings):
         """Probability of a wrong promotion of one candidate (Bonferroni over the candidates)."""
         return self.family_alpha / len(self.candidates)
 
+    @model_validator(mode="after")
+    def _success_alone_in_blocks(self) -> Self:
+        if self.utility and self.rule is not None:
+            raise ValueError(f"stress.block wants {UNWEIGHED}")
+        return self
+
+    @property
+    def rule(self) -> Rule | None:
+        """By what a candidate is stopped; None where all starts are one block."""
+        return planned_rule(
+            starts=self.planned_starts,
+            block=self.block,
+            conditions=self.perturbations,
+            simple=self.baselines,
+            margin=self.margin,
+            alpha=self.alpha,
+            rehearsal=self.limits.rehearsed,
+        )
+
     @field_validator("perturbations")
     @classmethod
     def _undisturbed_and_more(cls, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -189,12 +225,13 @@ def rollouts(
         folder: Where its rollouts lie; those of another training seed lie in another one.
 
     Raises:
+        StoppedError: It is a candidate that was stopped, since it could no longer pass.
         MissingEvidenceError: A condition is missing, has fewer starts than planned, or a rollout
             counts as another end than the one it came to.
     """
     # Most measures of the gate ask for them, each for every method.
     path = f"{folder}/{ROLLED}"
-    key = (path, method, settings.perturbations, settings.planned_starts)
+    key = (path, method, settings.perturbations, settings.planned_starts, settings.block)
     return evidence.once(key, lambda: _rollouts(evidence, settings, method, path))
 
 
@@ -204,11 +241,12 @@ def _rollouts(evidence: Evidence, settings: StressSettings, method: str, path: s
     absent = sorted(set(settings.perturbations) - set(rows["perturbation"]))
     if absent:
         raise MissingEvidenceError(f"{method} did not meet {', '.join(absent)}")
+    planned = starts_of(evidence, settings, method)
     per_condition = rows.groupby("perturbation")["start"].nunique()
-    if int(per_condition.min()) < settings.planned_starts:
+    if int(per_condition.min()) < planned:
         raise MissingEvidenceError(
             f"{method} has {int(per_condition.min())} starts in {per_condition.idxmin()}, "
-            f"planned {settings.planned_starts}"
+            f"planned {planned}"
         )
     _require_as_it_ended(rows, method)
     return rows

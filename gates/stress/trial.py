@@ -5,7 +5,14 @@ import math
 from gates.claim import trainings
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
+from gates.stress.rollouts import (
+    NOMINAL,
+    STRESS,
+    StressSettings,
+    rollouts,
+    success_lower,
+)
+from gates.stress.stopped import ran, require_as_said, starts_of, stopped_by
 from gates.verdicts import rounded
 from gates.words import percent
 from genpolicy.evidence.documents.stress import POWER, Power
@@ -28,6 +35,8 @@ def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: st
     Every seed has every planned start in every condition, which is asked before: of so many starts
     the report speaks, since one start is one draw in however many conditions it is met.
     """
+    if (blocks := ran(evidence, settings)) is not None:
+        require_as_said(evidence, blocks, STRESS)
     own = _starts(evidence, settings, candidate)
     unmatched = {name: len(own ^ _starts(evidence, settings, name)) for name in settings.baselines}
     seeds = rollouts(evidence, settings, candidate)["seed"].nunique()
@@ -39,7 +48,7 @@ def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: st
 
 def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tuple[str, int, str]]:
     # Those of a baseline are asked for with every candidate.
-    key = ("starts", method, settings.perturbations, settings.planned_starts)
+    key = ("starts", method, settings.perturbations, settings.planned_starts, settings.block)
     return evidence.once(key, lambda: _starts_of(evidence, settings, method))
 
 
@@ -51,7 +60,7 @@ def _starts_of(
         raise MissingEvidenceError(f"{method} has two rows of one seed, condition and start")
     if rows["start_sha256"].eq("").any():
         raise MissingEvidenceError(f"{method} has a start without hash")
-    planned = set(range(settings.planned_starts))
+    planned = set(range(starts_of(evidence, settings, method)))
     for (seed, condition), part in rows.groupby(["seed", "perturbation"]):
         where = f"{method}, seed {seed}, {condition}"
         if set(part["start"]) != planned:
@@ -137,4 +146,6 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
 )
 def nominal_success_lower(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Lower bound of success without perturbation."""
+    if stopped := stopped_by(evidence, settings, candidate, "nominal_success_lower"):
+        return stopped
     return success_lower(evidence, settings, candidate, (NOMINAL,))

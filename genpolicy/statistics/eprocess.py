@@ -95,6 +95,29 @@ def paired_e_value(differences: Array, *, margin: float, alpha: float) -> EProce
     )
 
 
+def highest_e_value(differences: Array, *, margin: float, left: int) -> float:
+    """The largest evidence that pairs can still lead to, whatever the rest of them show.
+
+    A factor of the process grows with its difference, so that no rest leads to more evidence than
+    one in which the candidate has all that there is, 1, on each pair.
+
+    Args:
+        differences: Those that are known, as of `paired_e_value`. Shape (n,).
+        margin: Gain to be shown, in (-1, 1).
+        left: Pairs that are still to come, not below 0.
+
+    Returns:
+        At least the largest evidence so far; it falls, or stays, with every pair that is known.
+
+    Raises:
+        ContractError: A value outside its range, or NaN.
+    """
+    d = np.asarray(differences, dtype=np.float64)
+    _check(d, margin, 0.5)
+    path = _paths(np.concatenate([d, np.ones(left)])[None, :], margin)[0]
+    return float(path.max()) if len(path) else 1.0
+
+
 def gain_interval(differences: Array, *, alpha: float) -> tuple[float, float]:
     """The gains that the pairs do not speak against, on either side, whenever one looks.
 

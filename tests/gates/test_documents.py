@@ -18,7 +18,7 @@ from gates.proof import judge
 from genpolicy.documents.document import Document
 from genpolicy.errors import BadInputError
 from genpolicy.evidence.documents.failures import FAILURE
-from genpolicy.evidence.documents.stress import TRAININGS, Trainings
+from genpolicy.evidence.documents.stress import BLOCKS, TRAININGS, Blocks, Trainings
 from genpolicy.integrity.documents import canonical_json
 
 
@@ -57,6 +57,9 @@ def root(tmp_path_factory, _ladder):
     (copied / "artifacts/reload/faults.json").write_bytes(canonical_json({"flow": failed}))
     # One seed trained everybody there, and of further ones no list is written.
     TRAININGS.write(copied / "artifacts/stress", Trainings(seeds=[1]))
+    # All starts are one block there, and of blocks nothing is said.
+    said = Blocks(block=20, starts=80, last={"flow": 2}, out={"flow": "promotion_e_value"})
+    BLOCKS.write(copied / "artifacts/stress", said)
     # Nobody searched on that ladder; a file of each failure is named by what it is about.
     failure = copied / "artifacts/failure_search" / FAILURE.file
     failure.parent.mkdir(parents=True)

@@ -1,5 +1,7 @@
 """Type I error at the boundary under continuous looking; power; invariances."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from genpolicy.errors import ContractError
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import (
     gain_interval,
+    highest_e_value,
     paired_e_value,
     power_table,
     simulate_pairs,
@@ -118,3 +121,26 @@ def test_of_few_pairs_nothing_is_said():
     assert low < 0 and high == 1.0
     with pytest.raises(ContractError):
         gain_interval(np.array([np.nan]), alpha=0.025)
+
+
+@pytest.mark.parametrize("margin", [-0.1, 0.0, 0.1])
+def test_no_rest_leads_to_more_evidence_than_one_that_is_all_won(margin):
+    """Also of graded differences; and what can be reached only falls with what is known."""
+    rng = stream(9, "highest", f"{margin:g}")
+    for _ in range(50):
+        pairs = np.clip(rng.normal(0.1, 0.6, 30), -1.0, 1.0)
+        reached = [highest_e_value(pairs[:n], margin=margin, left=30 - n) for n in range(31)]
+        assert all(later <= earlier for earlier, later in itertools.pairwise(reached))
+        whole = paired_e_value(pairs, margin=margin, alpha=0.05)
+        assert reached[-1] == whole.e_value
+        won = np.concatenate([pairs[:10], np.ones(20)])
+        assert reached[10] == paired_e_value(won, margin=margin, alpha=0.05).e_value
+
+
+def test_what_can_be_reached_is_the_largest_evidence_and_not_the_last():
+    won_then_lost = np.concatenate([np.ones(12), -np.ones(12)])
+    shown = paired_e_value(won_then_lost[:12], margin=0.0, alpha=0.05).e_value
+    assert highest_e_value(won_then_lost, margin=0.0, left=3) == shown > 20.0
+    assert highest_e_value(np.zeros(0), margin=0.0, left=0) == 1.0
+    with pytest.raises(ContractError, match="the differences"):
+        highest_e_value(np.array([1.5]), margin=0.0, left=1)

@@ -1,4 +1,4 @@
-"""`power.json`, `envelope.json`, `distilled.json` and `trainings.json` of the comparison."""
+"""What the comparison says beside its tables: power, envelope, teachers, trainings and blocks."""
 
 from dataclasses import dataclass
 
@@ -55,6 +55,23 @@ class Trainings:
     seeds: list[Count]
 
 
+@dataclass(frozen=True)
+class Blocks:
+    """How far each method was run where candidates that cannot pass any more are stopped.
+
+    Attributes:
+        block: Starts of a block.
+        starts: Planned starts.
+        last: Number of the last block of each method, from 1.
+        out: Of each candidate that was stopped, the criterion that it cannot meet any more.
+    """
+
+    block: Count
+    starts: Count
+    last: dict[str, Count]
+    out: dict[str, str]
+
+
 POWER = Document("power.json", Power)
 ENVELOPE = Document("envelope.json", Envelope)
 """Missing where no condition ran inside an envelope."""
@@ -62,6 +79,8 @@ DISTILLED = Document("distilled.json", dict[str, Distilled])
 """By method, of those that have a teacher; missing where none has."""
 TRAININGS = Document("trainings.json", Trainings)
 """Missing where one training seed is planned; see `folder_of_seed`."""
+BLOCKS = Document("blocks.json", Blocks)
+"""Missing where all planned starts are one block."""
 
 
 def folder_of_seed(seed: int) -> str:

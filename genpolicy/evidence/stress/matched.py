@@ -1,7 +1,8 @@
 """The matched comparison: every method on the same starts under the same perturbations.
 
-A shard is one method under one perturbation on all starts. Its worlds are stepped in lockstep and
-share the network's batches; which batch a sample was drawn in changes no bit of it.
+A shard is one method under one perturbation on all starts, or on a block of them. Its worlds are
+stepped in lockstep and share the network's batches; which batch a sample was drawn in changes no
+bit of it.
 """
 
 from collections.abc import Sequence
@@ -42,12 +43,17 @@ def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
     return [task.sample_start(stream(root_seed, "starts", index)) for index in range(count)]
 
 
-def run_shard(shard: Shard) -> ShardResult:
-    """All rollouts of a shard, in lockstep; writes its journal."""
+def run_shard(shard: Shard, *, every: bool = False) -> ShardResult:
+    """All rollouts of a shard, in lockstep; writes its journal.
+
+    Args:
+        shard: The shard.
+        every: Whether refused candidates of every rollout are given, worth a look or not.
+    """
     task = load_task(shard.comparison.task)
     with opened(shard.judged, task.observation, scene=task.scene_path) as policy:
         before = _again(shard, policy, BEFORE)
-        result = _run(shard, task, policy)
+        result = _run(shard, task, policy, every=every)
         return replace(result, again=[*before, *_again(shard, policy, AFTER)])
 
 
@@ -100,12 +106,12 @@ def run_out(rollouts: Sequence[Rollout], policy: Policy, comparison: Comparison)
         rollout.end(Outcome.TIMEOUT)
 
 
-def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
+def _run(shard: Shard, task: Task, policy: Running, *, every: bool) -> ShardResult:
     setup = setup_of(shard, task, policy)
-    epoch = task.calibration_epochs[-1]
+    epoch, starts = task.calibration_epochs[-1], shard.comparison.starts
     rollouts = [
-        Rollout(setup, task.start_from_json(text), index, calibration_epoch=epoch)
-        for index, text in enumerate(shard.comparison.starts)
+        Rollout(setup, task.start_from_json(starts[number]), number, calibration_epoch=epoch)
+        for number in shard.numbers
     ]
     run_out(rollouts, policy, shard.comparison)
     write_journal(shard.journal, [rollout.journal for rollout in rollouts])
@@ -119,7 +125,7 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         recoveries=[row for rows in recoveries for row in rows],
         overruns=overrun_rows(shard, rollouts),
         faults=fault_rows(shard, rollouts),
-        refused=refused_rows([row for row, _ in parts], refused, setup.checker),
+        refused=refused_rows([row for row, _ in parts], refused, setup.checker, every=every),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(

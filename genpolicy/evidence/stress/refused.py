@@ -48,6 +48,8 @@ def refused_rows(
     rollouts: Sequence[RolloutRow],
     refused: Sequence[Sequence[Refused]],
     checker: FeasibilityChecker,
+    *,
+    every: bool = False,
 ) -> list[RefusedRow]:
     """Rows of `refused.parquet`, in the order in which they were judged.
 
@@ -55,10 +57,12 @@ def refused_rows(
         rollouts: Of one method under one condition.
         refused: Of each of them, what was refused.
         checker: Refused it; says which action offends first.
+        every: Of every rollout, where only others can say which of them are worth a look.
     """
+    kept = [True] * len(rollouts) if every else kept_whole(rollouts)
     return [
         _row(row, one, checker)
-        for row, own, whole in zip(rollouts, refused, kept_whole(rollouts), strict=True)
+        for row, own, whole in zip(rollouts, refused, kept, strict=True)
         for one in (own if whole else ())
     ]
 

@@ -69,6 +69,8 @@ class StressSettings(Settings):
 
     Attributes:
         starts: Initial states, equal for all methods.
+        block: Starts after which it is asked who can no longer pass, and runs no further; null, or
+            not below `starts`: nobody is asked, and all run all.
         episode_limit_s: Longest rollout.
         samples: Candidates per invocation of a stochastic method.
         baselines: Simpler methods in the comparison, timed and run beside the candidates.
@@ -85,6 +87,7 @@ class StressSettings(Settings):
     """
 
     starts: int = Field(ge=1)
+    block: int | None = Field(default=None, ge=1)
     episode_limit_s: float = Field(gt=0)
     samples: int = Field(ge=1)
     baselines: list[str]

@@ -62,7 +62,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Shard:
-    """One method under one perturbation.
+    """One method under one perturbation, on all starts or on some that follow each other.
 
     Attributes:
         comparison: What all shards share.
@@ -72,6 +72,8 @@ class Shard:
         schedule: What it injects.
         journal: File to write the journal to.
         probe: Probe of the task that its worlds are under.
+        first: Number of its first start.
+        end: Number behind its last start; None: all starts from the first on.
     """
 
     comparison: Comparison
@@ -81,6 +83,13 @@ class Shard:
     schedule: Perturbation
     journal: Path
     probe: str = NOMINAL_PROBE
+    first: int = 0
+    end: int | None = None
+
+    @property
+    def numbers(self) -> range:
+        """Numbers of its starts."""
+        return range(len(self.comparison.starts))[self.first : self.end]
 
 
 @dataclass(frozen=True)

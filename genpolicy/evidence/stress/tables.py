@@ -14,7 +14,7 @@ from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
-from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE
+from genpolicy.evidence.documents.stress import BLOCKS, DISTILLED, ENVELOPE
 from genpolicy.evidence.rows.brought import FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
@@ -31,9 +31,12 @@ from genpolicy.evidence.rows.stress import (
 )
 from genpolicy.evidence.shadow.tables import account_rows, checker_document
 from genpolicy.evidence.stress.envelope import envelope_document, require_tighter
+from genpolicy.evidence.stress.in_blocks import run_in_blocks
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
+from genpolicy.evidence.stress.planned_blocks import Rule
+from genpolicy.evidence.stress.possible import blocks_document, seen_of
 from genpolicy.evidence.stress.shard import Comparison, Shard, ShardResult
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.rows import write_rows
@@ -43,7 +46,14 @@ from genpolicy.verification.commands import reach_of
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
 
 
-def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, scheduler: str) -> None:
+def write_stress(
+    folder: Path,
+    shards: Sequence[Shard],
+    *,
+    workers: int,
+    scheduler: str,
+    rule: Rule | None = None,
+) -> dict[str, int]:
     """Run every shard and write tables, journals and what the checker says of them.
 
     Args:
@@ -51,10 +61,28 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
         shards: One per method and perturbation.
         workers: Local processes.
         scheduler: `local` or the address of a Dask scheduler.
+        rule: Says who can no longer pass and runs no further; None: all run all of their starts.
+
+    Returns:
+        How many starts each method ran.
     """
     (folder / "journals").mkdir()
-    results = map_shards(run_shard, shards, workers=workers, scheduler=scheduler)
-    pairs = list(zip(shards, results, strict=True))
+    if rule is None:
+        results = map_shards(run_shard, shards, workers=workers, scheduler=scheduler)
+    else:
+        (parts := folder / "parts").mkdir()
+        results = run_in_blocks(shards, rule, parts=parts, workers=workers, scheduler=scheduler)
+        parts.rmdir()
+        seen = seen_of((row for result in results for row in result.rollouts), rule)
+        BLOCKS.write(folder, blocks_document(rule, seen))
+    _write_tables(folder, list(zip(shards, results, strict=True)))
+    return {
+        shard.judged.name: len(result.rollouts)
+        for shard, result in zip(shards, results, strict=True)
+    }
+
+
+def _write_tables(folder: Path, pairs: Sequence[tuple[Shard, ShardResult]]) -> None:
     rollouts = [row for _, result in pairs for row in result.rollouts]
     write_rows(folder / "rollouts.parquet", RolloutRow, rollouts)
     invocations = [row for _, result in pairs for row in result.invocations]
@@ -85,7 +113,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
         )
     write_rows(folder / "counts.parquet", StressCountRow, counts)
     write_rows(folder / "conservation.parquet", ConservationRow, balances)
-    write_rows(folder / "stub.parquet", StressStubRow, [result.stub for result in results])
+    write_rows(folder / "stub.parquet", StressStubRow, [result.stub for _, result in pairs])
     overruns = [row for _, result in pairs for row in result.overruns]
     write_rows(folder / "overruns.parquet", OverrunRow, overruns)
     _write_faults(folder, pairs)
@@ -93,6 +121,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "fixtures.parquet", FixtureAgainRow, again)
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
+    shards = [shard for shard, _ in pairs]
     journals = [shard.journal for shard in shards]
     comparison = shards[0].comparison
     task = load_task(comparison.task)

@@ -36,6 +36,11 @@ def test_a_condition_of_such_a_kind_may_have_another_name_and_is_asked_as_all_ar
     assert StressSettings(**{**PLAIN, "perturbations": named}).perturbations["again"].kind == kind
 
 
+def test_blocks_are_off_unless_they_are_planned():
+    assert StressSettings(**PLAIN).block is None
+    assert StressSettings(**PLAIN, block=4).block == 4
+
+
 def test_candidates_share_alpha_in_equal_parts():
     settings = StressSettings(**PLAIN)
     assert settings.alpha_of_each(1) == 0.05
@@ -44,7 +49,8 @@ def test_candidates_share_alpha_in_equal_parts():
 
 @pytest.mark.parametrize(
     "change",
-    [{"starts": 0}, {"episode_limit_s": 0.0}, {"samples": 0}, {"alpha": 0.0}, {"alpha": 1.0},
+    [{"block": 0}, {"block": 2.5},
+     {"starts": 0}, {"episode_limit_s": 0.0}, {"samples": 0}, {"alpha": 0.0}, {"alpha": 1.0},
      {"planned_effect": [0.5, 0.6]}, {"planned_effect": [0.5, 1.1]}, {"planned_effect": [0.5]},
      {"perturbations": {"nominal": {"kind": "earthquake"}}},
      {"perturbations": {"earthquake": {}}}, {"perturbations": {"nominal": None}}, {"retries": 3}],
