@@ -1,13 +1,14 @@
 """A candidate that failed a gate does not run in the stage behind it, while others go on."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import pytest
 
 from genpolicy.candidates import judged
 from genpolicy.contract.planner import PLANNER
+from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.stress import Power
 from stages import monitors, shadow, stress
 from stages._stage import load_params
@@ -162,6 +163,55 @@ def test_stress_rolls_out_every_trained_seed_by_the_same_plan(
     assert all(one[1:3] == (planned[0][1], models) for one in planned)
     document = json.loads((evidence / "artifacts/stress/trainings.json").read_text())
     assert document == {"seeds": [0, 7]}
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A shard, as far as the stage looks at one."""
+
+    judged: object
+    end: int | None = None
+
+
+def test_in_blocks_the_first_training_says_how_far_the_others_run(
+    evidence, stage, params, weightless, monkeypatch
+):
+    verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    params.raw["policy"]["seeds"] = [4, 0]
+    params.raw["stress"] |= {"starts": 6, "block": 2}
+    without(
+        monkeypatch, stress, "require_one_contract", "require_pinned_limits", "load_task",
+        "Comparison", "latency_models",
+    )  # fmt: skip
+    monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    monkeypatch.setattr(
+        stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
+    )
+    monkeypatch.setattr(
+        stress, "plan_shards", lambda _, who, *__, **___: [Planned(one) for one in who]
+    )
+    written = []
+
+    def write(_, shards, *, rule, **__):
+        written.append((shards, rule))
+        return {one.judged.name: 2 if one.judged.name == "flow" else 6 for one in shards}
+
+    monkeypatch.setattr(stress, "write_stress", write)
+    stress.work(params)
+    (first, rule), (further, none) = written
+    assert (rule.starts, rule.block, rule.simple) == (
+        6,
+        2,
+        tuple(params.raw["stress"]["baselines"]),
+    )
+    assert none is None and {one.end for one in first} == {None}
+    assert {one.judged.name: one.end for one in further} == {
+        one.judged.name: 2 if one.judged.name == "flow" else 6
+        for one in first if one.judged.name != PLANNER
+    }  # fmt: skip
+    params.raw["gate_d"]["utility"] = {"model": {"duration": [0.2, "slow is worth less"]}}
+    with pytest.raises(ConfigError, match=r"stress\.block is 2 of 6 starts, with gate_d\.utility"):
+        stress.work(params)
 
 
 @pytest.mark.parametrize("failed", [None, *ALL])
