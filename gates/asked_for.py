@@ -3,9 +3,89 @@
 No setting leaves one out. Written out, not imported: every stage reads the gates, and training may
 know neither feasibility nor execution. Tests hold the lists to the tables
 (`genpolicy/feasibility/checks.py`, `genpolicy/execution/checks.py`, of votes
-`genpolicy/candidates/votes.py`, of what stops `genpolicy/evidence/shadow/stop_mutants.py`, and
+`genpolicy/candidates/votes.py`, of places and clauses `genpolicy/evidence/shadow/places.py`,
+`clauses.py` and `continuity_mutants.py` there, of what stops `stop_mutants.py` there, and
 `genpolicy/evidence/shadow/on_the_way.py`, `genpolicy/evidence/shadow/corruption.py`).
 """
+
+_LIVE = ("arrival", "queue", "stub")
+PLACES_ASKED_FOR = {
+    "end_of_episode": ("door", "queue", "stub"),
+    "issued": ("door", "stub"),
+    "duplicate": ("door",),
+    "infeasible": ("arrival", "stub"),
+    "period": ("arrival", "stub"),
+    "action_hash": ("arrival", "stub"),
+    "same_action": ("stub",),
+    "execution_horizon": ("rows", "stub"),
+    "checked_rows": ("rows", "stub"),
+    "intervention": _LIVE,
+    "stopped": _LIVE,
+    "commander": _LIVE,
+    "controller_mode": _LIVE,
+    "session_epoch": _LIVE,
+    "checkpoint_mismatch": _LIVE,
+    "sampler_mismatch": _LIVE,
+    "calibration_mismatch": _LIVE,
+    "phase_transition": _LIVE,
+    "future_observation": _LIVE,
+    "stale_observation": _LIVE,
+    "after_phase_transition": _LIVE,
+    "after_calibration_mismatch": _LIVE,
+    "after_force_event": _LIVE,
+    "after_collision_event": _LIVE,
+    "after_observation_divergence": _LIVE,
+    "after_intervention": _LIVE,
+    "after_stop": _LIVE,
+    "after_reset": _LIVE,
+    "scene": _LIVE,
+    "expired": _LIVE,
+    "early": ("due", "stub"),
+    "window": ("arrival", "past", "stub"),
+    "late_chunk": ("arrival", "stub"),
+    "behind_accepted": ("arrival",),
+    "behind_queued": ("arrival",),
+    "predecessor": ("arrival",),
+    "queue_overflow": ("room",),
+    "superseded": ("rows", "due"),
+    "out_of_order": ("due", "stub"),
+    "sequence": ("stub",),
+    "continuity": ("next", "stub"),
+    "pace": ("due", "stub"),
+    "divergence": ("observed",),
+    "watchdog": ("supervisor",),
+}
+"""Where each row of the executor's table is asked. Each place is taken away alone, but that in the
+fresh layer, which has corrupted fixtures (`fresh`)."""
+_EVENT, _MAKER = ("seen", "was_here"), ("of_the_policy", "of_the_fallback")
+CLAUSES_ASKED_FOR = {
+    "after_phase_transition": _EVENT,
+    "after_calibration_mismatch": _EVENT,
+    "after_force_event": _EVENT,
+    "after_collision_event": _EVENT,
+    "after_observation_divergence": _EVENT,
+    "after_intervention": _EVENT,
+    "after_stop": _EVENT,
+    "after_reset": _EVENT,
+    "future_observation": ("newest", "unknown"),
+    "stale_observation": ("unknown_limit", "first_use"),
+    "expired": ("first_use",),
+    "late_chunk": ("unknown_phase", "first_use", "checked_row"),
+    "behind_accepted": ("condition", "start"),
+    "behind_queued": ("condition", "start"),
+    "superseded": ("now", "due"),
+    "checked_rows": ("first", "last"),
+    "commander": _MAKER,
+    "checkpoint_mismatch": _MAKER,
+    "sampler_mismatch": _MAKER,
+    "controller_mode": ("unknown",),
+    "scene": ("unseen", "unsaid", "other_bodies"),
+    "continuity": (
+        "hold", "first_row", "last_command", "rest", "commands_before", "watchdog",
+        "doubt", "person", "reset", "stop",
+    ),
+}  # fmt: skip
+"""What a row asks where it asks several things. Each is left out alone."""
 
 CHECKS_ASKED_FOR = (
     "representation.shape",
@@ -103,6 +183,12 @@ CHECKS_ASKED_FOR = (
     "execution.deaf_to_phase",
     "execution.deaf_to_silence",
     "execution.deaf_to_restart",
+    "execution.deaf_to_nan_force",
+    "execution.deaf_to_negative_force",
+    "execution.deaf_to_unknown_force",
+    "execution.deaf_to_unknown_collision",
+    *(f"execution.{row}@{place}" for row, places in PLACES_ASKED_FOR.items() for place in places),
+    *(f"execution.{row}:{clause}" for row, all_ in CLAUSES_ASKED_FOR.items() for clause in all_),
 )
 NOT_ASKED_OF_EVERY_TASK = (
     "geometric.scene_collision",

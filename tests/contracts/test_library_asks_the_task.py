@@ -54,6 +54,9 @@ LOCAL = {
     ("genpolicy/evidence/shadow/rig.py", "approach"): "a phase of the rig's own",
     ("genpolicy/evidence/shadow/rig.py", "insert"): "a phase of the rig's own",
     ("genpolicy/evidence/shadow/mutants.py", "insert"): "a phase of the rig's own",
+    ("genpolicy/evidence/shadow/voiding.py", "insert"): "a phase of the rig's own",
+    ("genpolicy/evidence/shadow/clause_scenarios.py", "insert"): "a phase of the rig's own",
+    ("genpolicy/evidence/shadow/clause_scenarios.py", "approach"): "a phase of the rig's own",
 }
 # Words inside the task's names that are plain words of robots, data or pages.
 PLAIN = {

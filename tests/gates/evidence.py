@@ -87,7 +87,11 @@ from genpolicy.evidence.rows.stress import (
     StressCountRow,
     StressStubRow,
 )
+from genpolicy.evidence.shadow.clauses import CLAUSES
+from genpolicy.evidence.shadow.continuity_mutants import CLAUSES as OF_CONTINUITY
+from genpolicy.evidence.shadow.continuity_mutants import ROW
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS as ON_THE_WAY
+from genpolicy.evidence.shadow.place_mutants import pairs
 from genpolicy.evidence.shadow.stop_mutants import DEAF
 from genpolicy.evidence.split import split_sha256
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
@@ -105,6 +109,9 @@ CHECKS = (
     *(("execution", check.name) for check in EXECUTION_CHECKS),
     *(("execution", f"vote_{check.name}") for check in VOTE_CHECKS),
     *(("execution", f"deaf_to_{name}") for name in DEAF),
+    *(("execution", f"{name}@{place}") for name, place in pairs()),
+    *(("execution", name) for name in CLAUSES),
+    *(("execution", f"{ROW}:{name}") for name in OF_CONTINUITY),
 )
 
 BASELINES = ("bc", "chunked_bc", "act")

@@ -55,6 +55,14 @@ EXECUTION_TRIED = ExecutionMutant(
 
 
 MOMENTS = module._moments
+TABLES = "genpolicy.evidence.shadow.tables"
+
+
+def _only_one_is_tried(patch):
+    """Of the rows of the table, and of places and clauses none: they take a second each time."""
+    patch.setattr(f"{TABLES}.run_mutants", lambda: [EXECUTION_TRIED])
+    for others in ("place_mutants", "clause_mutants", "continuity_mutants"):
+        patch.setattr(f"{TABLES}.{others}", list)
 
 
 class Demonstrator:
@@ -99,7 +107,7 @@ def written(params, task, checker, data, kit, tmp_path_factory):
     found = shadow_policy(shadow, Demonstrator(seen), first, seed=seed, two_mode=more)
     (root / SHADOW).mkdir(parents=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
+        _only_one_is_tried(patch)
         gallery = gallery_of(shadow, seen, found.candidates)
         write_shadow(
             root / SHADOW, [found], LAYERS_TRIED, gallery, cell=shadow.cell, robot=checker.cell
@@ -122,7 +130,7 @@ def root(written, moments, data, tmp_path, monkeypatch):
     """A copy to forge; mutants are tried in a test of their own, since they take a while."""
     monkeypatch.setattr(module, "_moments", lambda root, params: moments)
     monkeypatch.setattr(module, "missing_checks_evidence", lambda *_: list(LAYERS_TRIED))
-    monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
+    _only_one_is_tried(monkeypatch)
     demonstrator = Demonstrator(moments[1])
     monkeypatch.setattr("gates.rederive_draws.loaded_on", lambda *_: demonstrator)
     monkeypatch.setattr("gates.rederive_draws.AnsweringPolicy", lambda own: own)
@@ -289,7 +297,7 @@ def test_the_checks_are_left_out_again_on_the_moments_of_the_dataset(
         module, "missing_checks_evidence",
         lambda shadow, observations: seen.append((shadow, observations)) or LAYERS_TRIED,
     )  # fmt: skip
-    monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
+    _only_one_is_tried(monkeypatch)
     rederive_shadow(root, params)
     ((shadow, observations),) = seen
     assert len(observations) >= params["shadow"]["mutant_observations"]

@@ -19,9 +19,9 @@ from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, sett
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
-from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
+from genpolicy.evidence.shadow.tables import all_mutants
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -195,7 +195,7 @@ def test_every_check_left_out_is_noticed(shadow, cell):
 
 
 def test_every_mutant_is_found():
-    assert all(row.detected for row in run_mutants())
+    assert all(row.detected for row in all_mutants([]))
 
 
 def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):

@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any, cast
 
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
+from genpolicy.evidence.shadow import voiding
 from genpolicy.evidence.shadow.on_the_way import ASIDE_M
+from genpolicy.evidence.shadow.places import both_ask
 from genpolicy.evidence.shadow.rig import IMITATED, ROWS, Rig, passing_verdict
-from genpolicy.execution.checks import CHECKS, Check, Checks, Place, without
+from genpolicy.execution.checks import CHECKS, Check, Checks, without
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.moment import POLICY
 from genpolicy.verification.checker import check_journal
@@ -57,7 +59,7 @@ def slipped_by(check: Check, table: Checks) -> int:
 
     Beyond those that pass both; 0 for a check that one of them asks alone.
     """
-    if not asked_twice(check):
+    if not both_ask(check.name):
         return 0
     blind = without(table, check.name)
     by_both = _played(check.name, table).stub.accepted
@@ -66,12 +68,6 @@ def slipped_by(check: Check, table: Checks) -> int:
         _played(check.name, table, stub_checks=blind),
     )
     return sum(max(0, rig.stub.accepted - by_both) for rig in alone)
-
-
-def asked_twice(check: Check) -> bool:
-    """Executor and stub both ask it."""
-    both = Place.STUB in check.places and bool(check.places - {Place.STUB, Place.LAYER})
-    return both or Place.OBSERVED in check.places
 
 
 def _played(check: str, checks: Checks, *, stub_checks: Checks | None = None) -> Rig:
@@ -84,12 +80,21 @@ def _played(check: str, checks: Checks, *, stub_checks: Checks | None = None) ->
 
 def play(check: str, checks: Checks) -> list[Violation]:
     """Violations that the checker finds in the scenario of `check`, declarations aside."""
-    rig = _played(check, checks)
+    return violations_in(_played(check, checks))
+
+
+def violations_in(rig: Rig) -> list[Violation]:
+    """Violations that the checker finds in the journal of a rig, declarations aside."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "journal.mcap"
         write_journal(path, [rig.journal])
         report = check_journal(path)
     return [violation for violation in report.violations if violation.rule != DECLARATION]
+
+
+def found_in(rig: Rig, aside: frozenset[str] = frozenset()) -> list[str]:
+    """Rules that the checker finds broken in the journal of a rig, but for those put aside."""
+    return [found.rule for found in violations_in(rig) if found.rule not in aside]
 
 
 def _begin(rig: Rig, **changes: Any) -> None:
@@ -119,26 +124,6 @@ def _begun_before(event: Callable[[Rig], object]) -> Scenario:
         rig.run(2, condition_observation_event_time_s=0.0, predecessor_chunk_id="")
 
     return scenario
-
-
-def _new_epoch(rig: Rig) -> None:
-    rig.epoch = "epoch-2"
-    rig.observe()
-
-
-def _new_phase(rig: Rig) -> None:
-    rig.phase = "insert"
-    rig.observe()
-
-
-def _person_takes_over_and_hands_back(rig: Rig) -> None:
-    rig.executor.intervene(rig.now_s)
-    rig.executor.hand_back(rig.now_s)
-
-
-def _stop_and_reset(rig: Rig) -> None:
-    rig.supervisor.emergency_stop(rig.now_s)
-    rig.supervisor.human_reset(rig.now_s, "spotter")
 
 
 def _new_chunk_while_stopped(rig: Rig) -> None:
@@ -271,10 +256,6 @@ def _late_and_then(next_ms: int) -> Scenario:
     return scenario
 
 
-def _diverged(rig: Rig) -> None:
-    rig.observe(divergence_m=0.2)
-
-
 def _a_body_moves(rig: Rig) -> None:
     """A chunk is checked with a post that is then seen elsewhere."""
     rig.see(post=0.5)
@@ -302,14 +283,14 @@ def _offered(*, sequence: int, altered: bool) -> Scenario:
 
 SCENARIOS: dict[str, Scenario] = {
     "action_hash": _bad(actions_sha256="0" * 64),
-    "after_calibration_mismatch": _begun_before(_new_epoch),
-    "after_collision_event": _then(lambda rig: rig.executor.collision_event(rig.now_s)),
-    "after_force_event": _then(lambda rig: rig.executor.force_event(rig.now_s)),
-    "after_intervention": _begun_before(_person_takes_over_and_hands_back),
-    "after_observation_divergence": _then(_diverged),
-    "after_phase_transition": _begun_before(_new_phase),
-    "after_reset": _begun_before(lambda rig: rig.executor.reset(rig.now_s)),
-    "after_stop": _begun_before(_stop_and_reset),
+    "after_calibration_mismatch": _begun_before(voiding.new_epoch),
+    "after_collision_event": _then(voiding.collided),
+    "after_force_event": _then(voiding.felt),
+    "after_intervention": _begun_before(voiding.a_person_takes_over_and_hands_back),
+    "after_observation_divergence": _then(voiding.diverged),
+    "after_phase_transition": _begun_before(voiding.new_phase),
+    "after_reset": _begun_before(voiding.reset),
+    "after_stop": _begun_before(voiding.stop_and_reset),
     "behind_accepted": _older_behind_accepted,
     "behind_queued": _older_behind_queued,
     "calibration_mismatch": _bad(calibration_epoch="epoch-2"),
@@ -318,7 +299,7 @@ SCENARIOS: dict[str, Scenario] = {
     "controller_mode": _new_chunk_in_another_mode,
     "commander": _then(lambda rig: rig.executor.begin_fallback(rig.now_s)),
     "duplicate": _same_chunk_twice,
-    "divergence": _then(_diverged),
+    "divergence": _then(voiding.diverged),
     "early": _starts_later,
     "end_of_episode": _after_the_end,
     "execution_horizon": _whole_chunk,

@@ -8,10 +8,11 @@ checker cannot know; of a silence, and of a stop that was forgotten by one that 
 and must say so.
 """
 
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
 from genpolicy.evidence.shadow.mutants import DECLARATION
@@ -40,6 +41,11 @@ def _force_of_another_phase(rig: Rig) -> None:
     """A force that only the phase with the largest limit bears."""
     limits = rig.cell.execution.force_limit_n
     rig.supervisor.observe_force(rig.now_s, max(limits.values()), rig.phase)
+
+
+def _felt(force_n: object) -> Callable[[Rig], object]:
+    """Whatever somebody says that was felt."""
+    return lambda rig: rig.supervisor.observe_force(rig.now_s, cast(Any, force_n), rig.phase)
 
 
 def _collision(rig: Rig) -> None:
@@ -76,6 +82,40 @@ class DeafToForce(Supervisor):
     def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
         """Hears nothing."""
         return False
+
+
+class DeafToNan(Supervisor):
+    """Bears a force that is no number, as a comparison with a limit does."""
+
+    def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
+        """Hears what is a number."""
+        number = not (isinstance(force_n, float) and math.isnan(force_n))
+        return number and super().observe_force(now_s, force_n, phase)
+
+
+class DeafToNegativeForce(Supervisor):
+    """Bears a force below zero, which no sensor measured."""
+
+    def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
+        """Hears what is a size."""
+        size = not (isinstance(force_n, float) and force_n < 0)
+        return size and super().observe_force(now_s, force_n, phase)
+
+
+class DeafToUnknownForce(Supervisor):
+    """Takes a force that nobody knows for none."""
+
+    def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
+        """Hears what is known."""
+        return force_n is not None and super().observe_force(now_s, force_n, phase)
+
+
+class DeafToUnknownCollision(Supervisor):
+    """Takes a collision that nobody knows of for none."""
+
+    def observe_collision(self, now_s: float, collision: bool) -> bool:
+        """Hears what is known."""
+        return collision is not None and super().observe_collision(now_s, collision)
 
 
 class DeafToCollision(Supervisor):
@@ -130,7 +170,7 @@ class Deaf(NamedTuple):
     """
 
     supervisor: type[Supervisor]
-    tell: Callable[[Rig], None]
+    tell: Callable[[Rig], object]
     rule: str = ""
 
 
@@ -141,6 +181,13 @@ DEAF = {
     "phase": Deaf(DeafToPhase, _force_of_another_phase),
     "silence": Deaf(DeafToSilence, _silence, "P7.silence"),
     "restart": Deaf(DeafToRestart, _restart, "P7.stop"),
+    "nan_force": Deaf(DeafToNan, _felt(math.nan)),
+    "negative_force": Deaf(DeafToNegativeForce, _felt(-5.0)),
+    "unknown_force": Deaf(DeafToUnknownForce, _felt(None)),
+    "unknown_collision": Deaf(
+        DeafToUnknownCollision,
+        lambda rig: rig.supervisor.observe_collision(rig.now_s, cast(Any, None)),
+    ),
 }
 """What stops, and the supervisor that is deaf to it."""
 
@@ -166,7 +213,7 @@ def stop_mutants() -> list[ExecutionMutant]:
     return found
 
 
-def told(supervisor: type[Supervisor], tell: Callable[[Rig], None]) -> tuple[int, list[str]]:
+def told(supervisor: type[Supervisor], tell: Callable[[Rig], object]) -> tuple[int, list[str]]:
     """What happens after a supervisor was told to stop.
 
     Returns:

@@ -20,9 +20,12 @@ from genpolicy.evidence.rows.shadow import (
     ShadowHoldRow,
     ShadowStubRow,
 )
+from genpolicy.evidence.shadow.clause_mutants import clause_mutants
+from genpolicy.evidence.shadow.continuity_mutants import continuity_mutants
 from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.holds import hold_rows
 from genpolicy.evidence.shadow.mutants import run_mutants
+from genpolicy.evidence.shadow.place_mutants import place_mutants
 from genpolicy.evidence.shadow.stop_mutants import stop_mutants
 from genpolicy.evidence.shadow.vote_mutants import vote_mutants
 from genpolicy.execution.cell import Cell
@@ -82,10 +85,12 @@ def write_shadow(
 def all_mutants(layers: list[LayerMutant]) -> list[Mutant]:
     """Content of `mutants.json`: checks of the six layers, then those of the execution.
 
-    The executor's checks are owned by freshness and hand-over, layer six and beyond. Last come what
-    the supervisor stops for.
+    The executor's checks are owned by freshness and hand-over, layer six and beyond. Behind them
+    come what the supervisor stops for, each place at which the executor's checks are asked, and
+    each of their clauses.
     """
-    return [*layers, *run_mutants(), *vote_mutants(), *stop_mutants()]
+    rows = [*run_mutants(), *vote_mutants(), *stop_mutants()]
+    return [*layers, *rows, *place_mutants(), *clause_mutants(), *continuity_mutants()]
 
 
 def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:

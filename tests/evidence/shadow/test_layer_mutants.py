@@ -8,9 +8,13 @@ import pytest
 from gates.asked_for import CHECKS_ASKED_FOR, NOT_ASKED_OF_EVERY_TASK
 from genpolicy.candidates.votes import VOTE_CHECKS
 from genpolicy.evidence.shadow import layer_mutants
+from genpolicy.evidence.shadow.clauses import CLAUSES
+from genpolicy.evidence.shadow.continuity_mutants import CLAUSES as OF_CONTINUITY
+from genpolicy.evidence.shadow.continuity_mutants import ROW
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, always
 from genpolicy.evidence.shadow.layer_mutants import RULES, missing_checks_evidence
 from genpolicy.evidence.shadow.observations import spread
+from genpolicy.evidence.shadow.place_mutants import pairs
 from genpolicy.evidence.shadow.stop_mutants import DEAF, PREFIX
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.execution.checks import without
@@ -51,6 +55,8 @@ def test_the_gate_asks_for_every_row_of_both_tables():
     expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
     expected += [f"execution.vote_{check.name}" for check in VOTE_CHECKS]
     expected += [f"execution.{PREFIX}{name}" for name in DEAF]
+    expected += [f"execution.{name}@{place}" for name, place in pairs()]
+    expected += [f"execution.{name}" for name in (*CLAUSES, *(f"{ROW}:{n}" for n in OF_CONTINUITY))]
     assert list(CHECKS_ASKED_FOR) == expected
     some = [c for c in CORRUPTIONS if c.check and c.applicable is not always]
     assert {f"{c.layer}.{c.check}" for c in some} == set(NOT_ASKED_OF_EVERY_TASK)

@@ -6,11 +6,11 @@ import pytest
 
 from genpolicy.evidence.shadow.mutants import (
     SCENARIOS,
-    asked_twice,
     play,
     run_mutants,
     slipped_by,
 )
+from genpolicy.evidence.shadow.places import both_ask
 from genpolicy.evidence.shadow.rig import IMITATED, Rig
 from genpolicy.execution.checks import CHECKS, missing, without
 from genpolicy.execution.executor import Executor
@@ -31,7 +31,7 @@ def test_every_check_has_a_scenario_and_every_mutant_is_detected():
 
 def test_executor_and_stub_each_keep_out_alone_what_both_ask():
     """What one of the two does not see, the other alone must refuse, exactly once."""
-    twice = [check for check in CHECKS if asked_twice(check)]
+    twice = [check for check in CHECKS if both_ask(check.name)]
     assert len(twice) > 20
     assert [check.name for check in twice if slipped_by(check, _table(check))] == []
 

@@ -27,14 +27,20 @@ def test_each_is_asked_for_and_detected():
     assert rules == {
         "force": [COUNTED], "collision": [COUNTED], "emergency_stop": [COUNTED], "phase": [COUNTED],
         "silence": ["P7.silence", COUNTED], "restart": ["P7.stop", COUNTED],
+        "nan_force": [COUNTED], "negative_force": [COUNTED], "unknown_force": [COUNTED],
+        "unknown_collision": [COUNTED],
     }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", DEAF)
 def test_it_is_deaf_to_that_alone(name):
     """Else a mutant of one would be found by another; who hears no force hears none of them."""
+    of = {
+        "force": ("phase", "nan_force", "negative_force", "unknown_force"),
+        "collision": ("unknown_collision",),
+    }
     for other, deaf in DEAF.items():
-        deaf_too = other == name or (other, name) == ("force", "phase")
+        deaf_too = other == name or name in of.get(other, ())
         accepted, rules = told(deaf.supervisor, DEAF[name].tell)
         assert accepted == (TICKS if deaf_too else 0)
         assert rules == ([DEAF[name].rule] if deaf_too and DEAF[name].rule else [])
