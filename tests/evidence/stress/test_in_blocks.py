@@ -8,7 +8,7 @@ import pytest
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.documents.stress import BLOCKS
-from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.rows.stress import RefusedRow, RolloutRow
 from genpolicy.evidence.stress import in_blocks
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
@@ -115,6 +115,20 @@ def test_who_is_out_is_run_no_further_and_with_the_last_one_all_end(shards, whol
     derived = [row for path in journals for row in derived_with_recoveries(path)[0].values()]
     assert len(derived) == len(rows)
     assert not (tmp_path / "parts").exists()
+
+
+def test_of_refused_candidates_those_stay_that_all_rollouts_of_a_shard_say(
+    shards, whole, tmp_path, monkeypatch
+):
+    """A block alone does not know: here the rule names a start of the second one."""
+    monkeypatch.setattr(in_blocks, "kept_whole", lambda rows: [row.start == 1 for row in rows])
+    write_stress(
+        tmp_path, shards(tmp_path), workers=1, scheduler="local", rule=rule(block=1, alpha=0.9)
+    )
+    every = read_rows(whole / "refused.parquet", RefusedRow)
+    named = [row for row in every if row.start == 1]
+    assert read_rows(tmp_path / "refused.parquet", RefusedRow) == named
+    assert 0 < len(named) < len(every)
 
 
 def test_how_many_processes_share_the_work_changes_no_byte(shards, tmp_path):
