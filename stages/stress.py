@@ -1,19 +1,20 @@
 """Stage `stress`: all methods on identical starts, deadlines and perturbations, in simulation."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
-from genpolicy.candidates.contenders import in_comparison
+from genpolicy.candidates.contenders import Contender, in_comparison
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.documents.stress import POWER, TRAININGS, Trainings, folder_of_seed
 from genpolicy.evidence.fixtures_again import NO_FIXTURES, brought_fixtures
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import SEVERITIES, SeverityRow
-from genpolicy.evidence.stress.latency import LatencySection
+from genpolicy.evidence.stress.latency import LatencyModel, LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.evidence.stress.planned_blocks import planned_rule, weighed
+from genpolicy.evidence.stress.planned_blocks import Rule, planned_rule, weighed
 from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
@@ -81,24 +82,36 @@ def work(params: Params) -> None:
     with output_folder(ARTIFACTS / "stress") as folder:
         runs = {folder: judged}
         runs |= {folder / folder_of_seed(number): of_training(judged, number) for number in further}
-        ran: dict[str, int] = {}
-        for place, compared in runs.items():
-            place.mkdir(parents=True, exist_ok=True)
-            shards = plan_shards(
-                comparison, compared, section.conditions, latency=latency,
-                journals=place / "journals",
-            )  # fmt: skip
-            shards = as_far(shards, ran) if ran else shards
-            told = write_stress(
-                place, shards, workers=params.compute.workers,
-                scheduler=params.compute.scheduler, rule=None if ran else rule,
-            )  # fmt: skip
-            ran = ran if rule is None else ran or told
+        _run_each(params, section, runs, comparison=comparison, latency=latency, rule=rule)
         POWER.write(folder, power)
         if further:
             TRAININGS.write(folder, Trainings(seeds=further))
         if graded := section.severity_rows:
             write_rows(folder / SEVERITIES, SeverityRow, graded)
+
+
+def _run_each(
+    params: Params,
+    section: StressSettings,
+    runs: Mapping[Path, Sequence[Contender]],
+    *,
+    comparison: Comparison,
+    latency: Mapping[str, LatencyModel],
+    rule: Rule | None,
+) -> None:
+    """Run each training into its folder; the first says how far the others go."""
+    ran: dict[str, int] = {}
+    for place, compared in runs.items():
+        place.mkdir(parents=True, exist_ok=True)
+        shards = plan_shards(
+            comparison, compared, section.conditions, latency=latency, journals=place / "journals"
+        )
+        shards = as_far(shards, ran) if ran else shards
+        told = write_stress(
+            place, shards, workers=params.compute.workers,
+            scheduler=params.compute.scheduler, rule=None if ran else rule,
+        )  # fmt: skip
+        ran = ran if rule is None else ran or told
 
 
 if __name__ == "__main__":

@@ -18,14 +18,14 @@ def asked_about(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
     """
     if "D" in reports and reports["D"].promoted:
         return (reports["D"].promoted,)
-    standing: set[str] = set()
+    remaining: set[str] = set()
     for report in (reports[gate] for gate in GATES if gate in reports):
-        came = standing & report.candidates.keys() or set(report.candidates)
+        came = remaining & report.candidates.keys() or set(report.candidates)
         passing = {name for name in came if report.candidates[name] == "PASS"}
-        standing = passing or came or standing
+        remaining = passing or came or remaining
         if report.verdict != "PASS":
             break
-    return tuple(sorted(standing))
+    return tuple(sorted(remaining))
 
 
 def answers_about(report: GateReport, about: Collection[str]) -> list[Answer]:
