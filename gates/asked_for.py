@@ -57,7 +57,7 @@ PLACES_ASKED_FOR = {
 }
 """Where each row of the executor's table is asked. Each place is taken away alone, but that in the
 fresh layer, which has corrupted fixtures (`fresh`)."""
-_EVENT, _MAKER = ("seen", "was_here"), ("of_the_policy", "of_the_fallback")
+_EVENT, _MAKER = ("seen", "measured", "was_here"), ("of_the_policy", "of_the_fallback")
 CLAUSES_ASKED_FOR = {
     "after_phase_transition": _EVENT,
     "after_calibration_mismatch": _EVENT,
@@ -81,8 +81,8 @@ CLAUSES_ASKED_FOR = {
     "controller_mode": ("unknown",),
     "scene": ("unseen", "unsaid", "other_bodies"),
     "continuity": (
-        "hold", "first_row", "last_command", "rest", "commands_before", "watchdog",
-        "doubt", "person", "reset", "stop",
+        "here", "unseen", "hold", "first_row", "last_command", "rest", "commands_before",
+        "watchdog", "doubt", "person", "reset", "stop",
     ),
 }  # fmt: skip
 """What a row asks where it asks several things. Each is left out alone."""

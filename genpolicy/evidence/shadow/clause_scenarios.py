@@ -91,6 +91,18 @@ def _here_at_a_stop(rig: Rig) -> None:
     rig.tick(2)
 
 
+def _measured_before(event: Event) -> Scenario:
+    """A chunk on a new observation, that was checked from where the arm was before the event."""
+
+    def scenario(rig: Rig) -> None:
+        rig.observe()
+        rig.advance(0.1)
+        event(rig)
+        rig.run(2, context=replace(rig.context(), measured_at_s=0.0))
+
+    return scenario
+
+
 WAS_HERE: dict[str, Scenario] = {
     **{row: _was_here(event) for row, event in EVENTS.items()},
     "after_phase_transition": _was_here(_there_and_back(voiding.new_phase)),
@@ -250,9 +262,10 @@ def _checked_in(**bodies: tuple[tuple[float, ...], tuple[float, ...]]) -> Scenar
 
 TRIALS: dict[str, Trial] = {
     **{f"{row}:seen": Trial(comes_after(event)) for row, event in EVENTS.items()},
+    **{f"{row}:measured": Trial(_measured_before(event)) for row, event in EVENTS.items()},
     **{f"{row}:was_here": Trial(scenario) for row, scenario in WAS_HERE.items()},
     "future_observation:newest": Trial(_not_yet_seen),
-    "future_observation:unknown": Trial(_nothing_seen_since_the_reset),
+    "future_observation:unknown": Trial(_nothing_seen_since_the_reset, behind=("continuity",)),
     "stale_observation:unknown_limit": Trial(
         _a_phase_without_an_age, changes={"maximum_age_s": {"approach": 0.6}}
     ),

@@ -39,7 +39,7 @@ def _made_by(source: str) -> Callable[[Moment], bool]:
 
 
 def _voided(reason: R, **changes: int) -> Told:
-    """The event voids nothing by its time, or by what had arrived."""
+    """The event voids less: nothing of what had arrived."""
 
     def told(m: Moment) -> Moment:
         event = m.view.voidings.get(reason)
@@ -49,6 +49,15 @@ def _voided(reason: R, **changes: int) -> Told:
         return replace(m, view=replace(m.view, voidings=voidings))
 
     return told
+
+
+def _seen_when_measured(chunk: Chunk) -> Chunk:
+    seen_ns = max(chunk.times.condition_ns, chunk.measured_ns)
+    return replace(chunk, times=replace(chunk.times, condition_ns=seen_ns))
+
+
+def _measured_when_seen(chunk: Chunk) -> Chunk:
+    return replace(chunk, measured_ns=max(chunk.times.condition_ns, chunk.measured_ns))
 
 
 def _its_maker_is_active(field: str) -> Told:
@@ -85,9 +94,13 @@ VOIDED_BY = {
 
 CLAUSES: dict[str, Told] = {
     **{
-        f"{row}:{half}": _voided(reason, **changes)
+        f"{row}:{half}": told
         for row, reason in VOIDED_BY.items()
-        for half, changes in (("seen", {"before_ns": NEVER_NS}), ("was_here", {"arrivals": 0}))
+        for half, told in (
+            ("seen", _of_chunk(_seen_when_measured)),
+            ("measured", _of_chunk(_measured_when_seen)),
+            ("was_here", _voided(reason, arrivals=0)),
+        )
     },
     "future_observation:newest": lambda m: (
         m if m.view.newest_observation_ns is None else _view(newest_observation_ns=m.now_ns)(m)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
 from genpolicy.evidence.shadow import voiding
@@ -23,7 +24,7 @@ from genpolicy.evidence.shadow.rig import PERIOD_S, Rig, passing_verdict
 from genpolicy.evidence.shadow.voiding import Event
 from genpolicy.execution.checks import CHECKS, Checks, Place, without
 from genpolicy.execution.continuity import Continuity
-from genpolicy.execution.moment import Chunk
+from genpolicy.execution.moment import Chunk, Position, View
 
 ROW = "continuity"
 AN_HOUR_S = 3600.0
@@ -34,33 +35,33 @@ BEFORE = 2
 class WithoutHold(Continuity):
     """A chunk goes on with its next row, however long the arm was held."""
 
-    def follows(self, chunk: Any, about: Chunk, row: int, *now: Any, **more: Any) -> bool:
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
         """Asks whether it is the next row of the same chunk, and nothing else."""
         last = self._last
         if last is not None and last.chunk is chunk:
             return row == last.row + 1
-        return super().follows(chunk, about, row, *now, **more)
+        return super().follows(chunk, about, row, now_ns, view)
 
 
 class WithoutFirstRow(Continuity):
     """Another chunk begins at any row."""
 
-    def follows(self, chunk: Any, about: Chunk, row: int, *now: Any, **more: Any) -> bool:
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
         """Takes the row for the first that was checked."""
         if self._last is None or self._last.chunk is not chunk:
             about = replace(about, checked_rows=(row, about.checked_rows[1]))
-        return super().follows(chunk, about, row, *now, **more)
+        return super().follows(chunk, about, row, now_ns, view)
 
 
 class _Credulous(Continuity):
     """Another chunk was checked from what it should have been, in one respect."""
 
-    def follows(self, chunk: Any, about: Chunk, row: int, *now: Any, **more: Any) -> bool:
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
         """Asks about a chunk that was checked from something else."""
         if self._last is not None and self._last.chunk is not chunk:
             context = replace(chunk.context, **self._should(chunk.context))
             chunk = replace(chunk, context=context)
-        return super().follows(chunk, about, row, *now, **more)
+        return super().follows(chunk, about, row, now_ns, view)
 
     def _should(self, context: Any) -> dict[str, Any]:
         raise NotImplementedError
@@ -103,6 +104,31 @@ class WithoutForgetting(Continuity):
         """Keeps what was commanded last."""
 
 
+class WithoutHere(Continuity):
+    """Where no command says where the arm is, a chunk begins wherever it was checked from."""
+
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
+        """Takes where the chunk begins for where the arm is seen, if it is seen."""
+        if view.tcp_m is not None:
+            view = replace(view, tcp_m=_told_m(chunk))
+        return super().follows(chunk, about, row, now_ns, view)
+
+
+class WithoutUnseen(Continuity):
+    """The same, where nobody says where the arm is seen."""
+
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
+        """Takes where the chunk begins for where the arm is, if nobody sees it."""
+        if view.tcp_m is None:
+            view = replace(view, tcp_m=_told_m(chunk))
+        return super().follows(chunk, about, row, now_ns, view)
+
+
+def _told_m(chunk: Any) -> Position:
+    x, y, z = chunk.context.last_action[POSITION]
+    return x, y, z
+
+
 class Clause(NamedTuple):
     """Something that continuity asks.
 
@@ -137,9 +163,7 @@ def _second(**context: Any) -> Callable[[Rig], None]:
 
 
 def _checked_from(rig: Rig, **context: Any) -> None:
-    rig.observe()
-    rig.deliver(rig.chunk(context=replace(rig.context(), **context), predecessor_chunk_id=""))
-    rig.tick(2)
+    rig.run(2, context=replace(rig.context(), **context), predecessor_chunk_id="")
 
 
 def _almost_two_periods_later(rig: Rig) -> None:
@@ -190,7 +214,24 @@ def _moved_by(event: Event) -> Callable[[Rig], None]:
     return scenario
 
 
+def _elsewhere(rig: Rig) -> None:
+    """The first chunk of a session was checked from somewhere else than where the arm is seen."""
+    rig.observe()
+    context = replace(rig.context(), last_action=np.full(10, 0.5))
+    rig.deliver(rig.chunk(context=context))
+    rig.tick(2)
+
+
+def _unseen(rig: Rig) -> None:
+    """An observation does not say where the arm is."""
+    rig.executor.observe(rig.now_s, rig.now_s, rig.phase, rig.epoch)
+    rig.deliver(rig.chunk())
+    rig.tick(2)
+
+
 CLAUSES = {
+    "here": Clause(WithoutHere, Trial(_elsewhere)),
+    "unseen": Clause(WithoutUnseen, Trial(_unseen)),
     "hold": Clause(WithoutHold, Trial(_almost_two_periods_later)),
     "first_row": Clause(WithoutFirstRow, Trial(_at_its_second_row)),
     "last_command": Clause(WithoutLastCommand, Trial(_second(last_action=np.full(10, 0.5)))),
@@ -217,8 +258,8 @@ CLAUSES = {
         )
     },
 }  # fmt: skip
-"""By name. The first two ask of rows, then of what a chunk was checked from, of holds that no clock
-tells, and of who moved the arm."""
+"""By name. Two ask where the arm is, two of rows, three of what a chunk was checked from, two of
+holds that no clock tells, and three of who moved the arm."""
 
 
 def continuity_mutants(checks: Checks = CHECKS) -> list[ExecutionMutant]:

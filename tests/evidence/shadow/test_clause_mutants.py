@@ -46,9 +46,12 @@ def test_the_gate_asks_for_every_clause_by_name():
     assert asked == [*CLAUSES, *(f"{ROW}:{name}" for name in OF_CONTINUITY)]
 
 
-def test_every_row_of_what_an_event_voids_has_both_halves():
+def test_every_row_of_what_an_event_voids_asks_when_it_was_seen_and_measured_and_what_was_here():
     assert {row: PLACES[row].reason for row in PLACES if row.startswith("after_")} == VOIDED_BY
     assert set(EVENTS) == set(VOIDED_BY)
+    assert {f"{row}:{part}" for row in VOIDED_BY for part in ("seen", "measured", "was_here")} == {
+        name for name in CLAUSES if name.startswith("after_")
+    }
 
 
 @pytest.mark.parametrize("name", CLAUSES)
