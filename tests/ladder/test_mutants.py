@@ -58,7 +58,9 @@ LACKING = {
     "hearing": (
         "execution.deaf_to_nan_force",
         "from genpolicy.execution import supervisor\n"
-        "supervisor._is_borne = lambda force_n, limit_n: not force_n > limit_n",
+        "whole = supervisor._is_borne\n"
+        "supervisor._is_borne = lambda force_n, limit_n: (\n"
+        "    force_n != force_n or whole(force_n, limit_n))",
     ),
     "a vote": (
         "execution.vote_age",
