@@ -4,7 +4,10 @@ import browser
 import pytest
 from test_clips_drawn import SPACE, film
 
+from gates.pages import page
+from gates.pages.clips import Clips
 from gates.pages.clips_drawn import drawn_clip
+from gates.pages.figures import Small
 from genpolicy.pages.figures.drawing import LEAST_TEXT_PX
 from genpolicy.pages.style import page_style
 
@@ -20,9 +23,27 @@ DRAWN = {"gate_a", "gate_b", "gate_c", "gate_d", "index"}
 SHEETS = dict.fromkeys(NAMES, 6) | {"gate_e": 2}
 
 
+WHY = ("Median success of left", "Median success of right", "Slowest success", "Largest force",
+       "Collision: median", "Intervention: median")  # fmt: skip
+LINES = (
+    "camera_delay, start 3: success after 6.2 s; force at most 12.9 N, oldest action 240 ms.",
+    "genpolicy replay artifacts/stress/journals/flow__camera_delay.mcap "
+    "--session flow/camera_delay/3 --out watch.mcap",
+)
+
+
+def six_clips(*_):
+    shown = [Small(why, LINES, drawn_clip(film(), SPACE, k, said=why)) for k, why in enumerate(WHY)]
+    return Clips(method="flow", promoted=True, shown=tuple(shown))
+
+
 @pytest.fixture(scope="module")
 def pages(_written):
-    return {name: (_written / f"reports/{name}.html").read_text() for name in NAMES}
+    """As they are written; the desk with the six clips of a real ladder."""
+    found = {name: (_written / f"reports/{name}.html").read_text() for name in NAMES}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "clips_of", six_clips)
+        return found | {"index": page.index_page(_written)}
 
 
 def page_of(inner):
@@ -35,9 +56,10 @@ def on_paper(text, folder):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_prints_on_few_sheets_with_nothing_cut(pages, name, tmp_path):
-    page = tmp_path / f"{name}.html"
-    page.write_text(pages[name])
-    assert 1 <= browser.sheets(page, tmp_path) <= SHEETS[name]
+    shown = tmp_path / f"{name}.html"
+    for paper in ("letter", "A4"):
+        shown.write_text(pages[name].replace("@page{", f"@page{{size:{paper};"))
+        assert 1 <= browser.sheets(shown, tmp_path) <= SHEETS[name], paper
     told = on_paper(pages[name], tmp_path)
     assert told["outside"] == [] and told["sideways"] == [] and told["wide"] == 0
 
@@ -73,10 +95,10 @@ def test_a_clip_can_be_read_and_shows_one_moment(tmp_path):
 
 def test_a_picture_inside_a_page_is_shown_under_its_own_policy(pages, tmp_path):
     """The Nu checker says that the policy forbids it; what a browser shows is what counts."""
-    page = pages["gate_a"]
-    assert browser.pictures(page, tmp_path) == [True] == ["data:image/png" in page]
-    closed = page.replace("img-src data:", "img-src 'none'")
-    assert closed != page and browser.pictures(closed, tmp_path) == [False]
+    gate_a = pages["gate_a"]
+    assert browser.pictures(gate_a, tmp_path) == [True] == ["data:image/png" in gate_a]
+    closed = gate_a.replace("img-src data:", "img-src 'none'")
+    assert closed != gate_a and browser.pictures(closed, tmp_path) == [False]
 
 
 def test_what_is_wrong_is_seen(tmp_path):
@@ -94,6 +116,6 @@ def test_what_is_wrong_is_seen(tmp_path):
 
 
 def test_sheets_are_counted(tmp_path):
-    page = tmp_path / "three.html"
-    page.write_text(page_of('<p style="break-after:page">a</p>' * 2 + "<p>b</p>"))
-    assert browser.sheets(page, tmp_path) == 3
+    three = tmp_path / "three.html"
+    three.write_text(page_of('<p style="break-after:page">a</p>' * 2 + "<p>b</p>"))
+    assert browser.sheets(three, tmp_path) == 3
