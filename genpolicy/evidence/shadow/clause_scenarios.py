@@ -246,7 +246,7 @@ def _a_controller_that_says_nothing(rig: Rig) -> None:
 
 
 def _an_unreadable_scene(rig: Rig) -> None:
-    rig.executor.see(rig.now_s, {"post": ((np.nan,) * 3, UPRIGHT)})
+    rig.executor.see(rig.now_s, {"body": ((np.nan,) * 3, UPRIGHT)})
     rig.run(2)
 
 
@@ -309,7 +309,7 @@ TRIALS: dict[str, Trial] = {
     ),
     "controller_mode:unknown": Trial(_a_controller_that_says_nothing),
     "scene:unseen": Trial(_an_unreadable_scene),
-    "scene:unsaid": Trial(_checked_in(post=((0.0,) * 3, (0.0,) * 4))),
-    "scene:other_bodies": Trial(_checked_in(post=((0.5, 0.0, 0.0), UPRIGHT))),
+    "scene:unsaid": Trial(_checked_in(body=((0.0,) * 3, (0.0,) * 4))),
+    "scene:other_bodies": Trial(_checked_in(body=((0.5, 0.0, 0.0), UPRIGHT))),
 }
 """By clause."""

@@ -155,13 +155,3 @@ CLAUSES: dict[str, Told] = {
 }
 """Each clause by its row, and what the row is told instead. Of the rows that are not here there is
 one clause, so that the row itself is its mutant."""
-
-EQUIVALENT = {
-    "future_observation:now": "an observation from the future is not used and the believed time"
-    " never goes back, so that the newest one is never ahead of now",
-    "execution_horizon:rows": "of a row that the chunk does not have no action could be the same"
-    " (`same_action`), and it was not checked (`checked_rows`)",
-    "divergence:no_number": "what is said and is no distance is read as the largest that there is"
-    " before the row is asked",
-}
-"""Clauses that no input can show, each with its reason; a test asks the reason of random events."""

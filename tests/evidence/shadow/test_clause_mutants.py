@@ -8,7 +8,7 @@ from gates.asked_for import CLAUSES_ASKED_FOR
 from genpolicy.evidence.shadow import clause_mutants, mutants
 from genpolicy.evidence.shadow.clause_mutants import clause_mutant, lacking
 from genpolicy.evidence.shadow.clause_scenarios import TRIALS
-from genpolicy.evidence.shadow.clauses import CLAUSES, EQUIVALENT, VOIDED_BY
+from genpolicy.evidence.shadow.clauses import CLAUSES, VOIDED_BY
 from genpolicy.evidence.shadow.continuity_mutants import CLAUSES as OF_CONTINUITY
 from genpolicy.evidence.shadow.continuity_mutants import ROW
 from genpolicy.evidence.shadow.place_mutants import UNTOLD
@@ -25,6 +25,16 @@ FOUND_BY_WHAT_IS_UNTOLD = {
     "behind_accepted:condition", "behind_queued:start", "superseded:due",
 }  # fmt: skip
 """Nothing goes through without them: others refuse later, or the rows are lost in another way."""
+
+EQUIVALENT = {
+    "future_observation:now": "an observation from the future is not used and the believed time"
+    " never goes back, so that the newest one is never ahead of now",
+    "execution_horizon:rows": "of a row that the chunk does not have no action could be the same"
+    " (`same_action`), and it was not checked (`checked_rows`)",
+    "divergence:no_number": "what is said and is no distance is read as the largest that there is"
+    " before the row is asked",
+}
+"""Clauses that no input can show, each with its reason; a test asks the reason of random events."""
 
 
 def row_of(name):
