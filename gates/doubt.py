@@ -80,7 +80,13 @@ def said_once(doubts: Iterable[Doubt], names: Collection[str]) -> list[Doubt]:
     for doubt in doubts:
         name, rest = _apart(doubt.text, names)
         found.setdefault((doubt.gate if name else "", doubt.kind, rest), []).append((name, doubt))
-    return [_together(own, rest) for (_, _, rest), own in found.items()]
+    same: dict[tuple[str, str], Doubt] = {}
+    for told in (_together(own, rest) for (_, _, rest), own in found.items()):
+        first = same.setdefault((told.kind, told.text), told)
+        if told.gate != first.gate:
+            gates = tuple(dict.fromkeys((*first.also, told.gate, *told.also)))
+            same[told.kind, told.text] = replace(first, also=gates)
+    return list(same.values())
 
 
 def texts_once(texts: Iterable[str], names: Collection[str]) -> list[str]:

@@ -91,9 +91,9 @@ WRONGS = (
           "The candidates begin from other states than the baselines.",
           "small",
           patched("genpolicy/evidence/stress/matched.py",
-                  ("Rollout(setup, task.start_from_json(text), index,",
-                   "Rollout(setup, task.sample_start(stream(len(shard.judged.name), index)),"
-                   " index,")),
+                  ("Rollout(setup, task.start_from_json(starts[number]), number,",
+                   "Rollout(setup, task.sample_start(stream(len(shard.judged.name), number)),"
+                   " number,")),
           Expected(D, ("unmatched_starts",))),
     Wrong("rollouts_are_called_success", "code",
           "Whoever writes down the rollouts writes success for each of them.",

@@ -22,6 +22,8 @@ LEFT_OUT = {
 ON_SCREEN = {
     r'<(?:h2|ol) class="(?:reading )?on-screen">(?:Read|<li>)': "how to read the page",
     r'<small class="on-screen">|<p class="lead on-screen">': "the files and rows behind each",
+    r'<span class="on-screen"> What was measured': "links between pages and to rows",
+    r'<span class="on-screen">Play|<p class="on-screen"><code>': "the command that opens it",
     r'<(?:h2|pre) class="on-screen">(?:Reproduce|dvc)': "the commands that derive it again",
     r'<(?:h2|details) class="on-screen">(?:9 |<summary>)|<dl class="words on-screen">':
         "part 9 (commands, hashes, settings, words)",
