@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gates.stress.rollouts import StressSettings
-from genpolicy.evidence.stress.possible import Seen, first_out
 from genpolicy.evidence.stress.power import POWER_CORRELATION
 from genpolicy.seeds import stream
+from genpolicy.statistics.possible import Seen, first_out
 
 TRIALS = 400
 """Simulated trials of one world."""

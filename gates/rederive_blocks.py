@@ -13,12 +13,13 @@ from gates.settings import Limits, read_settings
 from gates.stated import compare_keys, mapping, refuse
 from gates.stress.rollouts import ROLLED, STRESS, StressSettings
 from genpolicy.errors import ContractError
+from genpolicy.evidence.blocks_run import blocks_document
 from genpolicy.evidence.documents.stress import BLOCKS
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.stress.planned_blocks import Rule
-from genpolicy.evidence.stress.possible import Seen, blocks_document, due, seen_of
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import read_rows
+from genpolicy.statistics.planned_blocks import Rule
+from genpolicy.statistics.possible import Seen, due, seen_of
 
 
 def rederive_blocks(root: Path, params: Mapping[str, Any], further: Sequence[str] = ()) -> None:

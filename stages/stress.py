@@ -14,7 +14,6 @@ from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import SEVERITIES, SeverityRow
 from genpolicy.evidence.stress.latency import LatencyModel, LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.evidence.stress.planned_blocks import Rule, planned_rule, weighed
 from genpolicy.evidence.stress.power import power_document
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
@@ -25,6 +24,7 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
+from genpolicy.statistics.planned_blocks import Rule, planned_rule, weighed
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
 from stages._limits import REHEARSAL, require_pinned_limits

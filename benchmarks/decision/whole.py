@@ -22,10 +22,11 @@ from gates.stress.gate import GATE
 from gates.stress.recoveries import RECOVERIES
 from gates.stress.rollouts import INVOCATIONS, JOURNALS, ROLLOUTS, STRESS, StressSettings
 from gates.stress.weights import DURATION, LEAST_OF_A_SUCCESS, by_cost
+from genpolicy.evidence.blocks_run import blocks_document
 from genpolicy.evidence.documents.stress import BLOCKS, POWER, Blocks
-from genpolicy.evidence.stress.planned_blocks import Rule
-from genpolicy.evidence.stress.possible import blocks_document, due, seen_of
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.statistics.planned_blocks import Rule
+from genpolicy.statistics.possible import due, seen_of
 
 TICKS, ASKED, LASTED_S = 160, 20, 8.0
 """Ticks of a rollout, invocations in it, and how long it lasts."""

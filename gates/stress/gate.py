@@ -30,7 +30,7 @@ from gates.stress.utility import mean_worths
 from gates.stress.visited import visited_said
 from gates.stress.weights import listed
 from gates.words import points
-from genpolicy.evidence.stress.possible import GAIN
+from genpolicy.statistics.possible import GAIN
 
 AVERAGED = (
     "Starts are the unit of independence; conditions and seeds of one start are averaged, and "

@@ -18,7 +18,7 @@ from gates.stress.weights import Weights, explained, require_weights
 from gates.words import percent
 from genpolicy.contract.planner import PLANNER
 from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
-from genpolicy.evidence.stress.planned_blocks import UNWEIGHED, Rule, planned_rule
+from genpolicy.statistics.planned_blocks import UNWEIGHED, Rule, planned_rule
 
 STRESS = "artifacts/stress"
 ROLLED = "rollouts.parquet"

@@ -1,7 +1,7 @@
 """Candidates whose rollouts were stopped before the planned end: derived again, and believed so.
 
 Fewer starts than planned are missing evidence, unless the rows themselves show that no outcome of
-the rest could have made the candidate pass (`genpolicy.evidence.stress.possible`). Then it failed,
+the rest could have made the candidate pass (`genpolicy.statistics.possible`). Then it failed,
 and cannot be promoted. What the stage says of it (`blocks.json`) decides nothing, and must agree.
 """
 
@@ -12,14 +12,14 @@ from typing import Protocol, cast
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from genpolicy.errors import ContractError
+from genpolicy.evidence.blocks_run import blocks_document
 from genpolicy.evidence.documents.stress import BLOCKS
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.stress.planned_blocks import Rule
-from genpolicy.evidence.stress.possible import (
+from genpolicy.statistics.planned_blocks import Rule
+from genpolicy.statistics.possible import (
     Ended,
     Out,
     Seen,
-    blocks_document,
     due,
     out_after,
     seen_of,

@@ -13,9 +13,9 @@ from gates.stress.rollouts import STRESS
 from genpolicy.errors import RefusedError
 from genpolicy.evidence.documents.stress import BLOCKS, Blocks, folder_of_seed
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.stress.planned_blocks import planned_rule
-from genpolicy.evidence.stress.possible import first_out, seen_of
 from genpolicy.integrity.rows import read_rows, write_rows
+from genpolicy.statistics.planned_blocks import planned_rule
+from genpolicy.statistics.possible import first_out, seen_of
 
 STARTS, BLOCK = 18, 3
 LAST = STARTS // BLOCK

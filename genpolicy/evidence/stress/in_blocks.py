@@ -14,12 +14,12 @@ import numpy as np
 from genpolicy.compute import map_shards
 from genpolicy.evidence.rows.stress import FaultRow, OverrunRow, RefusedRow, StressStubRow
 from genpolicy.evidence.stress.matched import run_shard
-from genpolicy.evidence.stress.planned_blocks import Rule
-from genpolicy.evidence.stress.possible import first_out, seen_of
 from genpolicy.evidence.stress.shard import Shard, ShardResult
 from genpolicy.evidence.stress.worth import kept_whole
 from genpolicy.execution.journal import Event, Journal, read_journal, write_journal
 from genpolicy.integrity.rows import read_rows, write_rows
+from genpolicy.statistics.planned_blocks import Rule
+from genpolicy.statistics.possible import first_out, seen_of
 
 
 @dataclass(frozen=True)

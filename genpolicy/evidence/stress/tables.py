@@ -12,6 +12,7 @@ from genpolicy.candidates.joining import REAL_TIME
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.blocks_run import blocks_document
 from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import BLOCKS, DISTILLED, ENVELOPE
@@ -35,11 +36,11 @@ from genpolicy.evidence.stress.in_blocks import run_in_blocks
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
-from genpolicy.evidence.stress.planned_blocks import Rule
-from genpolicy.evidence.stress.possible import blocks_document, seen_of
 from genpolicy.evidence.stress.shard import Comparison, Shard, ShardResult
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.rows import write_rows
+from genpolicy.statistics.planned_blocks import Rule
+from genpolicy.statistics.possible import seen_of
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.commands import reach_of
 

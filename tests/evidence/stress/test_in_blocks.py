@@ -18,12 +18,12 @@ from genpolicy.evidence.stress.latency import (
 )
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
-from genpolicy.evidence.stress.planned_blocks import Rule
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import plan_shards, write_stress
 from genpolicy.evidence.stress.trainings import as_far
 from genpolicy.execution.cell import Cell
 from genpolicy.integrity.rows import read_rows
+from genpolicy.statistics.planned_blocks import Rule
 from genpolicy.verification.rollouts import derived_with_recoveries
 
 STARTS = 4

@@ -17,7 +17,7 @@ from gates.stress.stopped import StoppedError, ran
 from gates.stress.trial import unmatched_starts
 from gates.writing import write_gate
 from genpolicy.evidence.documents.stress import BLOCKS, Blocks
-from genpolicy.evidence.stress.possible import first_out
+from genpolicy.statistics.possible import first_out
 
 BLOCK = 20
 FLOW, OTHER = "flow", "diffusion"

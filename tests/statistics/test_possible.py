@@ -11,22 +11,22 @@ from gates.stress.cost import STOPS
 from gates.stress.gains import inside_pairs, least_gain
 from gates.stress.rollouts import NOMINAL, StressSettings
 from genpolicy.errors import ContractError
+from genpolicy.evidence.blocks_run import blocks_document
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.stress import planned_blocks
-from genpolicy.evidence.stress.planned_blocks import Counted, Rule, planned_rule
-from genpolicy.evidence.stress.possible import (
+from genpolicy.seeds import stream
+from genpolicy.statistics import planned_blocks
+from genpolicy.statistics.eprocess import paired_e_value
+from genpolicy.statistics.intervals import clopper_pearson
+from genpolicy.statistics.planned_blocks import Counted, Rule, planned_rule
+from genpolicy.statistics.possible import (
     GAIN,
     STOPPED,
     Seen,
-    blocks_document,
     due,
     first_out,
     out_after,
     seen_of,
 )
-from genpolicy.seeds import stream
-from genpolicy.statistics.eprocess import paired_e_value
-from genpolicy.statistics.intervals import clopper_pearson
 
 STARTS, BLOCK, MARGIN, ALPHA = 90, 15, 0.05, 0.05 / 3
 SIMPLE = ("simple_0", "simple_1")

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.errors import ContractError
-from genpolicy.evidence.documents.stress import Blocks
-from genpolicy.evidence.stress.planned_blocks import Rule
 from genpolicy.statistics.eprocess import highest_e_value
 from genpolicy.statistics.intervals import clopper_pearson
+from genpolicy.statistics.planned_blocks import Rule
 
 Array = NDArray[np.float64]
 
@@ -249,23 +248,3 @@ def due(rule: Rule, seen: Mapping[str, Seen], candidates: Sequence[str]) -> dict
     own = {name: rule.starts if out is None else out[0] for name, out in ends.items()}
     last = max(own.values(), default=rule.starts)
     return {**own, **dict.fromkeys(rule.simple, last)}
-
-
-def blocks_document(rule: Rule, seen: Mapping[str, Seen]) -> Blocks:
-    """Which block was the last of each method, and why; content of `blocks.json`.
-
-    Args:
-        rule: What is planned.
-        seen: Rollouts by method.
-
-    Returns:
-        Of a method whose starts end with no block, 0 stands for the number of its last one.
-    """
-    candidates = [name for name in seen if name not in rule.simple]
-    found = {name: first_out(rule, seen, name) for name in candidates}
-    return Blocks(
-        block=rule.block,
-        starts=rule.starts,
-        last={name: rule.number(own.starts) or 0 for name, own in seen.items()},
-        out={name: out[1].criterion for name, out in found.items() if out},
-    )
