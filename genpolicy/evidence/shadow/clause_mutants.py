@@ -6,10 +6,10 @@ refuse a chunk when it comes that others would refuse later, or say why rows are
 found of those is that the journal does not say it (`Trial.says`).
 """
 
-from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
+from genpolicy.evidence.documents.shadow import ExecutionMutant
 from genpolicy.evidence.shadow.clause_scenarios import TRIALS, Trial
 from genpolicy.evidence.shadow.clauses import CLAUSES, Told
-from genpolicy.evidence.shadow.mutants import found_in
+from genpolicy.evidence.shadow.mutants import found_in, row_of
 from genpolicy.evidence.shadow.place_mutants import UNTOLD
 from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.checks import CHECKS, Check, Checks, without
@@ -33,15 +33,7 @@ def clause_mutant(checks: Checks, name: str) -> ExecutionMutant:
     whole = without(checks, "issued", *trial.behind)
     unchanged = _found(name, trial, whole)
     found = _found(name, trial, lacking(whole, name))
-    return ExecutionMutant(
-        check=name,
-        layer=EXECUTION,
-        detected=bool(found) and not unchanged,
-        violations=len(found),
-        rules=sorted(set(found)),
-        violations_unchanged=len(unchanged),
-        slipped=0,
-    )
+    return row_of(name, found, unchanged)
 
 
 def lacking(table: Checks, name: str) -> Checks:

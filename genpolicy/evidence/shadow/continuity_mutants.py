@@ -15,10 +15,10 @@ import numpy as np
 
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
+from genpolicy.evidence.documents.shadow import ExecutionMutant
 from genpolicy.evidence.shadow import voiding
 from genpolicy.evidence.shadow.clause_scenarios import Trial
-from genpolicy.evidence.shadow.mutants import found_in
+from genpolicy.evidence.shadow.mutants import found_in, row_of
 from genpolicy.evidence.shadow.place_mutants import UNTOLD, alone_at
 from genpolicy.evidence.shadow.rig import PERIOD_S, Rig, passing_verdict
 from genpolicy.evidence.shadow.voiding import Event
@@ -286,15 +286,7 @@ def continuity_mutant(checks: Checks, name: str) -> ExecutionMutant:
         one = _played(name, trial, alone_at(table, ROW, place))
         unchanged += _found(trial, one)
         slipped += max(0, one.stub.accepted - whole.stub.accepted)
-    return ExecutionMutant(
-        check=f"{ROW}:{name}",
-        layer=EXECUTION,
-        detected=bool(found) and not unchanged and not slipped,
-        violations=len(found),
-        rules=sorted(set(found)),
-        violations_unchanged=len(unchanged),
-        slipped=slipped,
-    )
+    return row_of(f"{ROW}:{name}", found, unchanged, slipped)
 
 
 def _played(name: str, trial: Trial, table: Checks, lacks: type[Continuity] | None = None) -> Rig:

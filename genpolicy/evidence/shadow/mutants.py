@@ -9,7 +9,7 @@ actions through, or the second look is none. The chunks are imitations, so both 
 """
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -41,17 +41,35 @@ def run_mutants() -> list[ExecutionMutant]:
         unchanged = play(check.name, table)
         mutant = play(check.name, without(table, check.name))
         slipped = slipped_by(check, table)
-        found = ExecutionMutant(
-            check=check.name,
-            layer=EXECUTION,
-            detected=bool(mutant) and not unchanged and not slipped,
-            violations=len(mutant),
-            rules=sorted({violation.rule for violation in mutant}),
-            violations_unchanged=len(unchanged),
-            slipped=slipped,
-        )
-        results.append(found)
+        results.append(row_of(check.name, rules_of(mutant), rules_of(unchanged), slipped))
     return results
+
+
+def row_of(
+    check: str, found: Sequence[str], unchanged: Sequence[str], slipped: int = 0
+) -> ExecutionMutant:
+    """What a mutant showed: it is detected if it alone broke rules, and nothing slipped.
+
+    Args:
+        check: Its name.
+        found: Rules that the mutant broke, each as often as it did.
+        unchanged: The same of the unchanged executor.
+        slipped: Actions that one of two who both ask let through.
+    """
+    return ExecutionMutant(
+        check=check,
+        layer=EXECUTION,
+        detected=bool(found) and not unchanged and not slipped,
+        violations=len(found),
+        rules=sorted(set(found)),
+        violations_unchanged=len(unchanged),
+        slipped=slipped,
+    )
+
+
+def rules_of(violations: Iterable[Violation]) -> list[str]:
+    """The rules of violations, in their order."""
+    return [violation.rule for violation in violations]
 
 
 def slipped_by(check: Check, table: Checks) -> int:
@@ -94,7 +112,7 @@ def violations_in(rig: Rig) -> list[Violation]:
 
 def found_in(rig: Rig, aside: frozenset[str] = frozenset()) -> list[str]:
     """Rules that the checker finds broken in the journal of a rig, but for those put aside."""
-    return [found.rule for found in violations_in(rig) if found.rule not in aside]
+    return [rule for rule in rules_of(violations_in(rig)) if rule not in aside]
 
 
 def _begin(rig: Rig, **changes: Any) -> None:

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
+from genpolicy.evidence.documents.shadow import ExecutionMutant
 from genpolicy.evidence.shadow import mutants, voiding
-from genpolicy.evidence.shadow.mutants import Scenario, found_in
+from genpolicy.evidence.shadow.mutants import Scenario, found_in, row_of
 from genpolicy.evidence.shadow.on_the_way import ASIDE_M
 from genpolicy.evidence.shadow.places import ELSEWHERE, PLACES, TOLD
 from genpolicy.evidence.shadow.rig import IMITATED, Rig, StandIn, passing_verdict
@@ -174,15 +174,7 @@ def _mutant(
     found, unchanged = (found_in(rig, trial.aside) for rig in (blind, alone))
     if not is_told(name, place, by=alone, but_not_by=blind):
         unchanged.append(UNTOLD)
-    return ExecutionMutant(
-        check=f"{name}@{place}",
-        layer=EXECUTION,
-        detected=bool(found) and not unchanged,
-        violations=len(found),
-        rules=sorted(set(found)),
-        violations_unchanged=len(unchanged),
-        slipped=0,
-    )
+    return row_of(f"{name}@{place}", found, unchanged)
 
 
 def alone_at(table: Checks, name: str, place: Place | None) -> Checks:

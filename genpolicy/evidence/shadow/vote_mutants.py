@@ -5,20 +5,16 @@ must find nothing, and with the tuple minus one row, and then it must find that 
 which could no longer be executed itself (`P6.vote`).
 """
 
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.votes import VOTE_CHECKS, Now, Past, Prediction, VoteCheck, join
 from genpolicy.contract.chunk import Candidate
-from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
-from genpolicy.evidence.shadow.mutants import DECLARATION
+from genpolicy.evidence.documents.shadow import ExecutionMutant
+from genpolicy.evidence.shadow.mutants import row_of, rules_of, violations_in
 from genpolicy.evidence.shadow.rig import EXECUTION as EXECUTION_OF_RIG
 from genpolicy.evidence.shadow.rig import ROWS, Rig, StandIn, passing_verdict
 from genpolicy.execution.checks import without
-from genpolicy.execution.journal import write_journal
-from genpolicy.verification.checker import check_journal
 from genpolicy.verification.joined import LABEL
 from genpolicy.verification.report import Violation
 
@@ -114,17 +110,7 @@ def vote_mutants() -> list[ExecutionMutant]:
     for check in VOTE_CHECKS:
         unchanged = play(check.name, VOTE_CHECKS)
         mutant = play(check.name, without(VOTE_CHECKS, check.name))
-        found.append(
-            ExecutionMutant(
-                check=f"{PREFIX}{check.name}",
-                layer=EXECUTION,
-                detected=bool(mutant) and not unchanged,
-                violations=len(mutant),
-                rules=sorted({violation.rule for violation in mutant}),
-                violations_unchanged=len(unchanged),
-                slipped=0,
-            )
-        )
+        found.append(row_of(f"{PREFIX}{check.name}", rules_of(mutant), rules_of(unchanged)))
     return found
 
 
@@ -133,8 +119,4 @@ def play(name: str, checks: tuple[VoteCheck, ...]) -> list[Violation]:
     voting = Voting(checks, f"{PREFIX}{name}")
     SCENARIOS[name](voting)
     voting.rig.executor.end_episode(voting.rig.now_s)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "journal.mcap"
-        write_journal(path, [voting.rig.journal])
-        report = check_journal(path)
-    return [violation for violation in report.violations if violation.rule != DECLARATION]
+    return violations_in(voting.rig)

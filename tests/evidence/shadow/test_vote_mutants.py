@@ -18,7 +18,7 @@ def test_every_row_has_a_scenario_and_every_mutant_is_detected_by_the_rule_of_vo
 
 def test_a_blind_checker_turns_the_evidence_red(monkeypatch):
     monkeypatch.setattr(
-        "genpolicy.evidence.shadow.vote_mutants.check_journal", lambda path: CheckReport()
+        "genpolicy.evidence.shadow.mutants.check_journal", lambda path: CheckReport()
     )
     assert not any(result.detected for result in vote_mutants())
 
