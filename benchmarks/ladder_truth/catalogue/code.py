@@ -42,7 +42,7 @@ WRONGS = (
           "small",
           all_of(
               patched("genpolicy/evidence/shadow/mutants.py",
-                      ("detected=bool(mutant) and not unchanged", "detected=True")),
+                      ("detected=bool(found) and not unchanged", "detected=True")),
               patched("genpolicy/execution/stub.py",
                       ("check = refusal(self.checks, Place.STUB, moment)", "check = None")),
           ),
