@@ -98,7 +98,7 @@ def train(
         else:
             course = _optimise(
                 network, averaged, objective,
-                data=data, followed=followed, request=request, device=device,
+                data=data, followed=followed, request=request, device=device, of=folder,
             )  # fmt: skip
             records = list(course)
         trained = _finished(averaged, followed, objective, data)
@@ -261,8 +261,9 @@ def _optimise(
     followed: Validation | None,
     request: TrainingRequest,
     device: str,
+    of: Path,
 ) -> Iterator[dict[str, float | int | None]]:
-    """Run all updates; yields one record per measurement."""
+    """Run all updates of the training of a folder; yields one record per measurement."""
     config = request.training
     trained = [*network.parameters(), *objective.parameters()]
     current: list[Tensor] = list(network.parameters())
@@ -278,7 +279,8 @@ def _optimise(
     order = _batch_order(len(data.actions), config.batch_size, request.seed)
     total, counted = torch.zeros((), device=device), 0
     measured_after = moments(config)
-    for update in counting(config.updates, f"{request.method}, update"):
+    # Variants and seeds of one method train side by side: only their folders tell them apart.
+    for update in counting(config.updates, f"{of.parent.name}/{of.name}, update"):
         rows = torch.as_tensor(next(order)).to(device)
         batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
         for group in optimiser.param_groups:

@@ -153,3 +153,18 @@ def test_batches_are_matched_over_methods(monkeypatch, tmp_path, request_for, tw
         train(tmp_path / method, request_for(method), windows=two_mode_windows())
     assert len(seen["flow"]) == 20
     assert seen["chunked_bc"] == seen["flow"]
+
+
+def test_trainings_of_one_method_are_told_apart_while_they_run(
+    monkeypatch, capsys, tmp_path, request_for, two_mode_windows
+):
+    """Variants and seeds of a method run side by side, and their lines come mixed."""
+    monkeypatch.setattr("genpolicy.progress.LOG_EVERY_S", 0.0)
+    for variant in ("reference", "longer_history"):
+        (tmp_path / variant).mkdir()
+        train(tmp_path / variant / "seed_4", request_for("bc"), windows=two_mode_windows())
+    said = capsys.readouterr().err
+    assert {line.split(":")[0] for line in said.splitlines()} == {
+        "reference/seed_4, update",
+        "longer_history/seed_4, update",
+    }
