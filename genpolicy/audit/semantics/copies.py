@@ -13,14 +13,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
-from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.middle import middle
-from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.meetings import may_cover
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import listed
-from genpolicy.audit.semantics.robust import episode_centred, episode_sums, some
-from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.semantics.robust import episode_centred, episode_sums
 
 WINDOW = 8
 PROBES = 6
@@ -42,6 +39,8 @@ SELF_COVER = 0.3
 # Of rows that are the same bit by bit, so many in a row that no way passes twice, and their share.
 EXACT_ROWS, EXACT_COVER = 4, 0.2
 LEAST_OVERLAP = 12
+# What changes in less than this share of the rows in which the liveliest column does, switches.
+SWITCHES = 0.5
 # A row whose step is below this share of the usual one repeats the row before.
 REST_STEP = 1e-6
 
@@ -68,14 +67,16 @@ class Moving:
     """The rows that move, closed up.
 
     Attributes:
-        signal: Scaled columns. Shape (M, D).
+        signal: Scaled columns in which copies are looked for. Shape (M, D).
+        whole: All scaled columns that move, in which a copy must agree. Shape (M, W).
         rows: Their rows. Shape (M,).
         starts: First of each episode, and their number. Shape (E + 1,).
-        usual: Usual distance between two episodes.
+        usual: Usual distance between two episodes, in `whole`.
         covered: Rows of each pair of episodes that agree, as stretches.
     """
 
     signal: Array
+    whole: Array
     rows: Integers
     starts: Integers
     usual: float = 0.0
@@ -86,10 +87,10 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     """Duplicates (up to a time offset, a cut, rests, tiny noise) and self-repeating episodes."""
     count = len(motion.starts) - 1
     result = Copies(np.zeros(count, bool), np.full(count, -1), np.zeros(count, bool))
-    every = _signal(data, motion)
+    every = _signals(data, motion)
     if every is None:
         return result
-    moving = _moving(every, motion)
+    moving = _moving(*every, motion)
     _repeats(result, moving)
     places, segment = _windows(moving.starts)
     if len(places) < NEIGHBOURS + 1:
@@ -99,11 +100,11 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     tree = cKDTree(points)
     nearest = tree.query(points[probes], k=NEIGHBOURS)
     distance, found = np.asarray(nearest[0]), np.asarray(nearest[1])
-    moving = replace(moving, usual=_usual_distance(points, segment, probes))
-    number, place = np.nonzero(distance <= CLOSE * moving.usual)
+    near = CLOSE * _usual_distance(points, segment, probes)
+    moving = replace(moving, usual=_usual_distance(*_sparse(moving.whole, places, segment, probes)))
+    number, place = np.nonzero(distance <= near)
     probe, other = probes[number], found[number, place]
     rows = places[np.sort(np.stack([probe, other], axis=1)[probe != other], axis=1)]
-    near = CLOSE * moving.usual
     hopeful = may_cover(
         moving.signal, moving.starts, rows, near=near, least=LEAST_OVERLAP, own=SELF_COVER, of=COVER
     )
@@ -112,72 +113,8 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     return result
 
 
-def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> list[Finding]:
-    """Duplicates as a finding."""
-    names, total = data.episodes.uuid, len(data.episodes)
-    findings = []
-    if some(copies.duplicate, total, settings.outlier_share):
-        pairs = [
-            f"{names[k]} of {names[copies.of[k]]}" for k in np.flatnonzero(copies.duplicate)[:3]
-        ]
-        count = int(copies.duplicate.sum())
-        findings.append(
-            Finding(
-                kind="duplicate",
-                variable="episode",
-                where=listed(names[copies.duplicate]),
-                question="faulty_episodes_share",
-                measured=count / total,
-                floor=settings.outlier_share,
-                unit="share",
-                action=f"{count} of {total} episodes are copies of others ({'; '.join(pairs)}): "
-                "keep one of each and repeat the audit.",
-            )
-        )
-    return findings
-
-
-def glued_findings(
-    copies: Copies, data: AuditInput, motion: Motion, settings: AuditSettings
-) -> list[Finding]:
-    """Episodes that hold their rows twice, or jump in their middle as no motion of these data.
-
-    Args:
-        copies: What was found of copies.
-        data: Canonical data.
-        motion: The motion as it was recorded, with its pieces.
-        settings: Share of episodes from which it is said.
-    """
-    total = len(motion.starts) - 1
-    jumps = np.zeros(total, dtype=bool)
-    jumps[motion.segment[np.setdiff1d(motion.pieces[:-1], motion.starts)]] = True
-    either = copies.repeats_itself | jumps
-    if not some(either, total, settings.outlier_share):
-        return []
-    twice = int(copies.repeats_itself.sum())
-    what = [f"hold the same rows twice ({twice})"] if twice else []
-    if (jumps & ~copies.repeats_itself).any():
-        what.append("jump in their middle")
-    return [_glued(data.episodes.uuid[either], total, settings, " or ".join(what))]
-
-
-def _glued(names: Text, total: int, settings: AuditSettings, what: str) -> Finding:
-    count = len(names)
-    return Finding(
-        kind="glued",
-        variable="episode",
-        where=listed(names),
-        question="faulty_episodes_share",
-        measured=count / total,
-        floor=settings.outlier_share,
-        unit="share",
-        action=f"{count} of {total} episodes {what} ({listed(names)}): several recordings were "
-        "joined. Split them where they meet and repeat the audit.",
-    )
-
-
-def _signal(data: AuditInput, motion: Motion) -> Array | None:
-    """Scaled columns that move inside episodes, action and observation. Shape (N, D)."""
+def _signals(data: AuditInput, motion: Motion) -> tuple[Array, Array] | None:
+    """Scaled columns that move inside episodes, action and observation: some (N, D), all (N, W)."""
     columns = np.concatenate([data.action, data.observation], axis=1)
     length = np.maximum(np.diff(motion.starts), 1)[:, None]
     inside = episode_centred(columns, motion.starts)
@@ -186,13 +123,17 @@ def _signal(data: AuditInput, motion: Motion) -> Array | None:
     moving = np.flatnonzero(power > 0.05 * np.where(total > 0, total, np.inf))
     if len(moving) == 0:
         return None
-    # Of many columns those that move most for their range; all of them say the same of a copy.
-    order = np.argsort(-(power[moving] / total[moving]), kind="stable")[:LARGEST_WIDTH]
-    chosen = np.sort(moving[order])
-    return np.asarray(columns[:, chosen] / power[chosen])
+    # Looked for is in those of many that move most for their range, and in what only switches now
+    # and then last. They alone say no copy: of one operator gripper, phase and height may be as
+    # alike on two sides of what stands in the way.
+    stirs = (np.diff(columns[:, moving], axis=0) != 0).mean(axis=0)
+    switches = stirs < SWITCHES * stirs.max()
+    chosen = np.sort(np.lexsort((-(power[moving] / total[moving]), switches))[:LARGEST_WIDTH])
+    whole = np.asarray(columns[:, moving] / power[moving])
+    return whole[:, chosen], whole
 
 
-def _moving(signal: Array, motion: Motion) -> Moving:
+def _moving(signal: Array, whole: Array, motion: Motion) -> Moving:
     """The rows in which something moves; the first of each episode is one."""
     steps = np.linalg.norm(np.diff(signal, axis=0, prepend=signal[:1]), axis=1)
     first = motion.starts[:-1][np.diff(motion.starts) > 0]
@@ -202,7 +143,8 @@ def _moving(signal: Array, motion: Motion) -> Moving:
     kept[first] = True
     counts = np.concatenate([[0], np.cumsum(kept)])
     rows = np.flatnonzero(kept)
-    return Moving(signal[rows], rows, np.asarray(counts[motion.starts], dtype=np.int64))
+    starts = np.asarray(counts[motion.starts], dtype=np.int64)
+    return Moving(signal[rows], whole[rows], rows, starts)
 
 
 def _repeats(result: Copies, moving: Moving) -> None:
@@ -266,10 +208,22 @@ def _probes(moving: Moving, places: Integers) -> Integers:
     return np.searchsorted(places, np.asarray(probes, dtype=np.int64))
 
 
+def _some(probes: Integers) -> Integers:
+    """Some five hundred of them."""
+    return probes[:: max(1, len(probes) // 500)]
+
+
+def _sparse(
+    whole: Array, places: Integers, segment: Integers, probes: Integers
+) -> tuple[Array, Integers, Integers]:
+    """Windows at some probes as points, the episode of each, and their numbers."""
+    chosen = _some(probes)
+    return _points(whole, places[chosen]), segment[chosen], np.arange(len(chosen))
+
+
 def _usual_distance(points: Array, segment: Integers, probes: Integers) -> float:
     """Median distance between windows of different episodes, at probes."""
-    step = max(1, len(probes) // 500)
-    chosen = probes[::step]
+    chosen = _some(probes)
     apart = pdist(points[chosen])
     other = pdist(segment[chosen][:, None].astype(np.float64)) > 0.0
     return float(np.median(apart[other])) if other.any() else 0.0
@@ -285,7 +239,7 @@ def _judge(result: Copies, moving: Moving, row: int, other: int) -> None:
         return
     back = min(row - int(starts[a]), other - int(starts[b]))
     on = min(int(starts[a + 1]) - row, int(starts[b + 1]) - other)
-    first, second = moving.signal[row - back : row + on], moving.signal[other - back : other + on]
+    first, second = moving.whole[row - back : row + on], moving.whole[other - back : other + on]
     apart = np.linalg.norm(first - second, axis=1) > CLOSE * moving.usual
     before, after = np.flatnonzero(apart[:back]), np.flatnonzero(apart[back:])
     begin = int(before[-1]) + 1 if len(before) else 0
@@ -336,7 +290,8 @@ def _same(first: Array, second: Array, usual: float) -> bool:
     small = first[1:] - first[:-1]
     small = small[1:] - small[:-1]
     power = (small**2).sum(axis=0)
-    noisy = power > 0
+    # What is the same to the bit, as a phase or a schedule, may be so in two demonstrations.
+    noisy = (power > 0) & (left != 0).any(axis=0)
     if not noisy.any():
         return True
     share = np.sqrt((left**2).sum(axis=0)[noisy] / power[noisy])

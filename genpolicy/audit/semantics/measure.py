@@ -24,6 +24,7 @@ from genpolicy.audit.semantics.clocks import (
     position_clocks,
     shift_rows,
 )
+from genpolicy.audit.semantics.copy_findings import copy_findings, glued_findings
 from genpolicy.audit.semantics.drift import (
     delay_drift_findings,
     drift_findings,
@@ -89,8 +90,8 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *continuity.negative_findings(negative),
         *continuity.time_findings(data, settings),
         *stubs,
-        *copies.glued_findings(copied, data, made, settings),
-        *copies.copy_findings(copied, data, settings),
+        *glued_findings(copied, data, made, settings),
+        *copy_findings(copied, data, settings),
         *calibration.release_findings(data, releases, settings),
     ]
     findings += _of_parts(data, recorded, follows, findings, settings)

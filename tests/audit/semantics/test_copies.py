@@ -6,6 +6,7 @@ from arms import SETTINGS, arms, build, parts, rebuilt, some
 
 from genpolicy.audit.data import canonical
 from genpolicy.audit.semantics import copies, measure
+from genpolicy.audit.semantics.motion import make_motion
 from genpolicy.seeds import stream
 
 
@@ -52,6 +53,33 @@ def test_a_single_copy_is_a_mishap_and_a_repeated_demonstration_no_copy():
     again = [command + 5e-4 * rng.normal(size=command.shape) for _ in range(60)]
     answers = [seen + 5e-4 * rng.normal(size=seen.shape) for _ in range(60)]
     assert kinds(build(again, answers, epochs=2, period_s=0.05)) == []
+
+
+ALIKE = {
+    "switching": lambda time, at: (time > at).astype(float),
+    "smooth": lambda time, at: np.sin(2 * np.pi * (time + at)),
+}
+
+
+@pytest.mark.parametrize("kind", ALIKE)
+def test_what_agrees_in_many_columns_and_goes_on_two_sides_is_no_copy(kind):
+    """One operator's gripper, phases and height are alike whichever side they pass on."""
+    rng = stream(12, "sides")
+    time = np.linspace(0.0, 1.0, 90)
+    alike = np.column_stack([ALIKE[kind](time, at) for at in np.linspace(0.1, 0.9, 12)])
+    commands, seen = [], []
+    for number in range(60):
+        across = (-1.0) ** number * 0.12 * np.sin(np.pi * time) + 0.0005 * number
+        tremor = 3e-4 * rng.normal(size=(90, 3))
+        place = np.column_stack([0.3 * time, across, 0.05 * np.cos(np.pi * time)]) + tremor
+        commands.append(place)
+        seen.append(np.column_stack([place + 3e-5 * rng.normal(size=(90, 3)), alike]))
+    data = build(commands, seen, epochs=2, period_s=0.05)
+    assert not copies.find_copies(data, make_motion(data)).duplicate.any()
+    if kind == "switching":
+        twice = copied(data, 0.1)
+        found = copies.find_copies(twice, make_motion(twice)).duplicate
+        assert np.flatnonzero(found).tolist() == list(range(60, 66))
 
 
 @pytest.mark.parametrize("share", [0.1, 1.0])
