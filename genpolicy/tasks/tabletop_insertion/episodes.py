@@ -94,21 +94,41 @@ class Demonstration:
     collision: bool
 
 
-def demonstrate(spec: EpisodeSpec) -> Demonstration:
+@dataclass(frozen=True)
+class TaskParts:
+    """Who demonstrates where: what insertion tasks that share these sensors differ in.
+
+    Attributes:
+        task: Name of the task.
+        start: Its starts.
+        world: Its cell.
+        operator: Its operators.
+        camera_noise_m: Standard deviation of the camera's noise on every position.
+    """
+
+    task: str = TASK_NAME
+    start: type[InsertionStart] = InsertionStart
+    world: type[TabletopWorld] = TabletopWorld
+    operator: type[Operator] = Operator
+    camera_noise_m: float = CAMERA_NOISE_M
+
+
+def demonstrate(spec: EpisodeSpec, parts: TaskParts = TaskParts()) -> Demonstration:
     """Let the planned operator act in the cell until it is done.
 
     Raises:
         ContractError: The start of the plan belongs to another task.
     """
-    if not isinstance(spec.start, InsertionStart):
+    if type(spec.start) is not parts.start:
         raise ContractError(
             where=f"episode {spec.index}: start",
             found=type(spec.start).__name__,
-            expected="InsertionStart",
+            expected=parts.start.__name__,
             action="Plan the episode with this task's episode_specs.",
         )
-    world = TabletopWorld(spec.start, settings=WorldSettings(spec.calibration_epoch))
-    operator = Operator(
+    settings = WorldSettings(spec.calibration_epoch, seed=spec.index)
+    world = parts.world(spec.start, settings=settings)
+    operator = parts.operator(
         world,
         order=Order(kind=spec.kind, side=spec.mode, style=STYLES[spec.operator]),
         rng=stream(spec.root_seed, "operator", spec.index),
@@ -148,9 +168,9 @@ def demonstrate(spec: EpisodeSpec) -> Demonstration:
     )
 
 
-def record_episode(spec: EpisodeSpec) -> RecordedEpisode:
+def record_episode(spec: EpisodeSpec, parts: TaskParts = TaskParts()) -> RecordedEpisode:
     """Demonstrate one planned episode and record it; equal plans give equal recordings."""
-    done = demonstrate(spec)
+    done = demonstrate(spec, parts)
     recorder = _Recorder(spec)
     period_ns = round(1e9 * ACTION_PERIOD_S)
     duration_ns = len(done.actions) * period_ns
@@ -165,7 +185,7 @@ def record_episode(spec: EpisodeSpec) -> RecordedEpisode:
         JOINTS_STREAM: recorder.samples(JOINTS_STREAM, STEP_NS * done.steps, joints),
         FORCE_STREAM: recorder.samples(FORCE_STREAM, STEP_NS * done.steps, force),
         CAMERA_STREAM: recorder.samples(
-            CAMERA_STREAM, frames_ns, _camera(spec, recorder, len(frames_ns))
+            CAMERA_STREAM, frames_ns, _camera(spec, recorder, len(frames_ns), parts.camera_noise_m)
         ),
         ACTION_STREAM: recorder.samples(ACTION_STREAM, ticks_ns, done.actions),
     }
@@ -175,24 +195,25 @@ def record_episode(spec: EpisodeSpec) -> RecordedEpisode:
             time_ns = spec.start_time_ns + index * period_ns
             events.append((time_ns, time_ns, phase))
     return RecordedEpisode(
-        episode_uuid=_episode_uuid(spec),
+        episode_uuid=_episode_uuid(spec, parts.task),
         streams=streams,
         phase_events=tuple(events),
-        metadata=_metadata(spec, done, recorder),
+        metadata=_metadata(spec, done, recorder, parts.task),
     )
 
 
-def replay(start: InsertionStart, actions: Array) -> str:
+def replay(start: InsertionStart, actions: Array, parts: TaskParts = TaskParts()) -> str:
     """Outcome of recorded actions, executed open loop from the recorded start.
 
     Args:
         start: Recorded start.
         actions: Recorded actions. Shape (n, 10).
+        parts: Whose cell it is.
 
     Returns:
         `success` or `failure`.
     """
-    world = TabletopWorld(start, settings=WorldSettings("epoch_1"))
+    world = parts.world(start, settings=WorldSettings("epoch_1"))
     for action in actions:
         world.command(action)
         world.advance()
@@ -239,33 +260,35 @@ class _Recorder:
         )
 
 
-def _camera(spec: EpisodeSpec, recorder: _Recorder, frames: int) -> Array:
+def _camera(spec: EpisodeSpec, recorder: _Recorder, frames: int, noise_m: float) -> Array:
     start, error = spec.start, find_epoch(spec.calibration_epoch).camera
     assert isinstance(start, InsertionStart)  # `demonstrate` has refused any other
     noise = recorder.noise(CAMERA_STREAM, (frames, 4))
     yaw = start.hole_yaw_rad + error.yaw_rad + CAMERA_NOISE_RAD * noise[:, 2]
     return np.stack(
         [
-            start.hole_x_m + error.x_m + CAMERA_NOISE_M * noise[:, 0],
-            start.hole_y_m + error.y_m + CAMERA_NOISE_M * noise[:, 1],
+            start.hole_x_m + error.x_m + noise_m * noise[:, 0],
+            start.hole_y_m + error.y_m + noise_m * noise[:, 1],
             np.cos(yaw),
             np.sin(yaw),
-            start.post_y_m + error.y_m + CAMERA_NOISE_M * noise[:, 3],
+            start.post_y_m + error.y_m + noise_m * noise[:, 3],
         ],
         axis=1,
     )
 
 
-def _episode_uuid(spec: EpisodeSpec) -> str:
-    digest = sha256_bytes(f"{TASK_NAME} {spec.root_seed} {spec.index}".encode())
+def _episode_uuid(spec: EpisodeSpec, task: str) -> str:
+    digest = sha256_bytes(f"{task} {spec.root_seed} {spec.index}".encode())
     return str(uuid.UUID(hex=digest[:32], version=4))
 
 
-def _metadata(spec: EpisodeSpec, done: Demonstration, recorder: _Recorder) -> dict[str, str]:
+def _metadata(
+    spec: EpisodeSpec, done: Demonstration, recorder: _Recorder, task: str
+) -> dict[str, str]:
     streams = (ROBOT_STREAM, JOINTS_STREAM, FORCE_STREAM, CAMERA_STREAM, ACTION_STREAM)
     offsets = {clock_offset_key(name): str(recorder.declared_offset_ns(name)) for name in streams}
     return {
-        "task": TASK_NAME,
+        "task": task,
         "object": spec.object_name,
         "operator": spec.operator,
         "calibration_epoch": spec.calibration_epoch,

@@ -27,7 +27,6 @@ INSERT_TCP_M = scene.FIXTURE_TOP_M + 0.014
 LIFT_M = 0.085
 ALIGNED_M = 0.0025
 GIVE_UP_FORCE_N = 25.0
-MAXIMUM_TRIES = 3
 # Shares of the last step per period while braking to a stop, 0.25 s.
 BRAKING = (0.9, 0.7, 0.45, 0.2, 0.05)
 
@@ -100,11 +99,16 @@ def route(position_m: Array, hover_m: Array, *, side: str, style: Style, post_y_
 class Operator:
     """Demonstrates one episode, one action per call of `act`.
 
+    Attributes:
+        maximum_tries: How often it goes down to the hole before it lets go where it is.
+
     Args:
         world: The cell; the operator sees its true state.
         order: What to do.
         rng: The operator's own noise: tremor, aim, when a disturbance comes.
     """
+
+    maximum_tries = 3
 
     def __init__(self, world: TabletopWorld, *, order: Order, rng: np.random.Generator) -> None:
         self._world, self._order, self._rng = world, order, rng
@@ -139,13 +143,13 @@ class Operator:
             yield from self._open()
             yield from self._wait(0.25)
         else:
-            for _ in range(MAXIMUM_TRIES):
+            for _ in range(self.maximum_tries):
                 yield from self._align()
                 if (yield from self._descend()):
                     break
                 if self._order.kind == "missed":
                     break
-                yield from self._rise(self._hover())
+                yield from self._again()
             yield from self._open()
             yield from self._wait(0.15)
         top = self._position.copy()
@@ -157,16 +161,31 @@ class Operator:
         height = scene.FIXTURE_TOP_M + scene.TIP_OFFSET_M + HOVER_HEIGHT_M
         return np.array([self._aim[0], self._aim[1], height])
 
-    def _approach(self) -> Iterator[bool]:
-        points = route(
+    def _way(self) -> Array:
+        """Points from here to above the hole. Shape (n, 3), m."""
+        return route(
             self._position,
             self._hover(),
             side=self._order.side,
             style=self._style,
             post_y_m=self._world.start.post_y_m,
         )
+
+    def _corrected(self) -> Array:
+        """Where it aims after the peg stood on something. Shape (2,), m."""
+        return self._hole.copy()
+
+    def _stands(self) -> bool:
+        """The peg stands on something on its way down."""
+        return self._world.contact_force_n > GIVE_UP_FORCE_N
+
+    def _again(self) -> Iterator[bool]:
+        """Back to where it can go down once more."""
+        yield from self._rise(self._hover())
+
+    def _approach(self) -> Iterator[bool]:
         path = travel(
-            points,
+            self._way(),
             speed_m_s=self._style.speed_m_s,
             acceleration_m_s2=self._style.acceleration_m_s2,
         )
@@ -235,8 +254,8 @@ class Operator:
         for position in path:
             self._position = position.copy()
             yield True
-            if self._world.contact_force_n > GIVE_UP_FORCE_N:
-                self._aim = self._hole.copy()
+            if self._stands():
+                self._aim = self._corrected()
                 return False
         yield from self._wait(0.1)
         return self._world.tip_depth_m > 0.03

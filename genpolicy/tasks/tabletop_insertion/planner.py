@@ -49,6 +49,8 @@ RING_M, RING = 0.002, 6
 LIFT_M = 0.010
 YAW_RAD_S = 0.5
 FINE_M = 0.0005
+OUT_OF_THE_WAY_M = 0.4
+"""A post as far beside the arm as this stands in no way that the workspace allows."""
 
 
 def plan_insertion(history: Array, *, horizons: HorizonConfig) -> Array:
@@ -185,11 +187,15 @@ def _way(seen: _Seen) -> tuple[float, CubicSpline]:
 def _around(seen: _Seen, sign: float) -> tuple[float, CubicSpline]:
     """Length and points of the way on one side, from where the arm is."""
     x, post_x, side = seen.tcp_m[0], scene.POST_X_M, sign * VIA_M
-    corners = [
-        np.array([post_x - 0.068, seen.post_y_m + 0.72 * side, CRUISE_Z_M]),
-        np.array([post_x + 0.005, seen.post_y_m + side, CRUISE_Z_M]),
-        np.array([post_x + 0.085, seen.post_y_m + 0.62 * side, CRUISE_Z_M]),
-    ]
+    corners = (
+        []
+        if abs(seen.post_y_m - seen.tcp_m[1]) > OUT_OF_THE_WAY_M
+        else [
+            np.array([post_x - 0.068, seen.post_y_m + 0.72 * side, CRUISE_Z_M]),
+            np.array([post_x + 0.005, seen.post_y_m + side, CRUISE_Z_M]),
+            np.array([post_x + 0.085, seen.post_y_m + 0.62 * side, CRUISE_Z_M]),
+        ]
+    )
     ahead = [corner for corner in corners if corner[0] > x + 0.02]
     knots = np.array([seen.tcp_m, *ahead, np.append(seen.hole_m, HOVER_Z_M)])
     chords = np.linalg.norm(np.diff(knots, axis=0), axis=1)

@@ -52,10 +52,10 @@ class Variant:
     friction_scale: float = 1.0
 
 
-@lru_cache(maxsize=8)
-def load_model(variant: Variant = Variant()) -> mujoco.MjModel:
+@lru_cache(maxsize=16)
+def load_model(variant: Variant = Variant(), path: Path = SCENE_PATH) -> mujoco.MjModel:
     """The compiled scene; shared by all worlds of the variant, nobody may change it."""
-    spec = mujoco.MjSpec.from_file(str(SCENE_PATH))
+    spec = mujoco.MjSpec.from_file(str(path))
     peg = spec.geom("peg")
     peg.size = [
         0.01 * variant.peg_width_scale, 0.01 * variant.peg_width_scale, PEG_HALF_LENGTH_M,

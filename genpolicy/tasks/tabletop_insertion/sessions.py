@@ -4,7 +4,7 @@ Nothing here simulates. Each choice (side, operator, kind, object, start) has it
 that the side cannot depend on anything that is observed; epochs follow one another in time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from genpolicy.seeds import stream
 from genpolicy.tasks.api import EpisodeSpec
 from genpolicy.tasks.tabletop_insertion.experts import KINDS, SIDES, STYLES
 from genpolicy.tasks.tabletop_insertion.probes import EPOCHS
-from genpolicy.tasks.tabletop_insertion.start import sample_start
+from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start
 
 # How the kinds are shared out; the numbers sum to 1.
 DEFAULT_SHARES: dict[str, float] = {
@@ -26,7 +26,11 @@ EPISODE_SPACING_NS = 60_000_000_000
 
 
 def episode_specs(
-    root_seed: int, episodes: int, *, shares: Mapping[str, float] | None = None
+    root_seed: int,
+    episodes: int,
+    *,
+    shares: Mapping[str, float] | None = None,
+    draw_start: Callable[[np.random.Generator], InsertionStart] = sample_start,
 ) -> list[EpisodeSpec]:
     """Plan `episodes` episodes, in order of time.
 
@@ -34,6 +38,7 @@ def episode_specs(
         root_seed: Seed of the session.
         episodes: How many, >= 1.
         shares: Share of each kind of episode; kinds left out do not occur.
+        draw_start: Draws where an episode begins.
 
     Raises:
         ConfigError: A share is negative, of an unknown kind, or they do not sum to 1.
@@ -55,7 +60,7 @@ def episode_specs(
                 object_name=OBJECTS[int(_draw(root_seed, index, "object").integers(len(OBJECTS)))],
                 calibration_epoch=epochs[index * len(epochs) // episodes],
                 mode=SIDES[int(_draw(root_seed, index, "side").integers(2))],
-                start=sample_start(_draw(root_seed, index, "start")),
+                start=draw_start(_draw(root_seed, index, "start")),
                 start_time_ns=FIRST_EPISODE_NS + index * EPISODE_SPACING_NS,
             )
         )

@@ -1,5 +1,6 @@
 """Where an episode begins: arm, hole and post, drawn independently and uniformly."""
 
+from collections.abc import Mapping, Set
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -49,24 +50,28 @@ class InsertionStart:
         return canonical_json(asdict(self)).decode()
 
 
+def uniform_start(
+    rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Numbers by name, each uniform around its centre; drawn in the order of the names."""
+    return {
+        name: float(centre + half * rng.uniform(-1.0, 1.0))
+        for name, (centre, half) in ranges.items()
+    }
+
+
 def sample_start(rng: np.random.Generator) -> InsertionStart:
     """Draw a start; each number uniform in its range, independent of the others."""
-    return InsertionStart(
-        **{
-            name: float(centre + half * rng.uniform(-1.0, 1.0))
-            for name, (centre, half) in RANGES.items()
-        }
-    )
+    return InsertionStart(**uniform_start(rng, RANGES))
 
 
-def start_from_json(text: str) -> InsertionStart:
-    """The start that `to_json` wrote.
+def finite_numbers(text: str, names: Set[str]) -> dict[str, float]:
+    """The numbers of a start, by name, from its JSON.
 
     Raises:
         ContractError: Names are missing or unknown, or a value is no finite number.
     """
     values = parse_json(text.encode(), where="scene_start")
-    names = {field.name for field in fields(InsertionStart)}
     if not isinstance(values, dict) or set(values) != names:
         raise ContractError(
             where="scene_start",
@@ -82,4 +87,13 @@ def start_from_json(text: str) -> InsertionStart:
                 expected="a finite number",
                 action="Record the episode again, or refuse it.",
             )
-    return InsertionStart(**{name: float(value) for name, value in values.items()})
+    return {name: float(value) for name, value in values.items()}
+
+
+def start_from_json(text: str) -> InsertionStart:
+    """The start that `to_json` wrote.
+
+    Raises:
+        ContractError: Names are missing or unknown, or a value is no finite number.
+    """
+    return InsertionStart(**finite_numbers(text, {field.name for field in fields(InsertionStart)}))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_star
 from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
 
 Array = NDArray[np.float64]
+S = TypeVar("S", bound=InsertionStart)
 
 # The ceiling keeps the tip of the held peg below the top of the post.
 WORKSPACE = Workspace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.24))
@@ -79,7 +81,7 @@ class TabletopInsertion:
 
     def make_world(self, start: Start, *, settings: WorldSettings) -> TabletopWorld:
         """A world at rest at the start."""
-        return TabletopWorld(_own(start), settings=settings)
+        return TabletopWorld(own_start(start, InsertionStart), settings=settings)
 
     def scene_poses(self, observation: Array) -> dict[str, tuple[Array, Array]]:
         """Where the observation puts each movable body of the scene: (m (3,), wxyz (4,))."""
@@ -152,15 +154,20 @@ class TabletopInsertion:
 
     def replay(self, start: Start, actions: Array) -> str:
         """Outcome of recorded actions replayed open loop."""
-        return episodes.replay(_own(start), actions)
+        return episodes.replay(own_start(start, InsertionStart), actions)
 
 
-def _own(start: Start) -> InsertionStart:
-    if not isinstance(start, InsertionStart):
+def own_start(start: Start, expected: type[S]) -> S:
+    """The start, where it is one of the task's own.
+
+    Raises:
+        ContractError: It is another task's.
+    """
+    if not isinstance(start, expected):
         raise ContractError(
             where="the start",
             found=type(start).__name__,
-            expected="InsertionStart",
+            expected=expected.__name__,
             action="Draw it with this task's sample_start or start_from_json.",
         )
     return start

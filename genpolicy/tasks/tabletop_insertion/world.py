@@ -39,6 +39,11 @@ SUCCESS_RETREAT_M = 0.06
 class TabletopWorld:
     """One simulated cell, at rest at its start.
 
+    Attributes:
+        hole_half_width_m: Half the width of the hole.
+        camera_noise_m: Standard deviation of white noise on every position that the camera sees,
+            beside that of a probe.
+
     Args:
         start: Where arm, hole and post begin.
         settings: Calibration epoch and probe.
@@ -48,15 +53,21 @@ class TabletopWorld:
         ContractError: The arm cannot reach the start.
     """
 
+    hole_half_width_m = scene.HOLE_HALF_WIDTH_M
+    camera_noise_m = 0.0
+
     def __init__(self, start: InsertionStart, *, settings: WorldSettings) -> None:
         self.start = start
         self.settings = settings
         self._epoch = find_epoch(settings.calibration_epoch)
         self._probe = find_probe(settings.probe)
-        self.model = scene.load_model(self._probe.variant)
+        self.model = self._model()
         self.data = mujoco.MjData(self.model)
         self._bind()
         self._reset()
+
+    def _model(self) -> mujoco.MjModel:
+        return scene.load_model(self._probe.variant)
 
     def _bind(self) -> None:
         model, data = self.model, self.data
@@ -176,7 +187,7 @@ class TabletopWorld:
     def success(self) -> bool:
         """Peg released in the hole, gripper open, hand up, never a forbidden contact."""
         hole = np.array([self.start.hole_x_m, self.start.hole_y_m])
-        inside = np.hypot(*(self._peg_position[:2] - hole)) < scene.HOLE_HALF_WIDTH_M
+        inside = np.hypot(*(self._peg_position[:2] - hole)) < self.hole_half_width_m
         return (
             not self._collided
             and not self.holding
@@ -314,7 +325,8 @@ class TabletopWorld:
 
     def _see(self) -> None:
         epoch, probe, start = self._epoch.camera, self._probe.camera, self.start
-        noise = probe.noise_m * self._noise.standard_normal(3) if probe.noise_m else np.zeros(3)
+        noise_m = float(np.hypot(probe.noise_m, self.camera_noise_m))
+        noise = noise_m * self._noise.standard_normal(3) if noise_m else np.zeros(3)
         yaw = start.hole_yaw_rad + epoch.yaw_rad + probe.yaw_rad
         shift_x, shift_y = epoch.x_m + probe.x_m, epoch.y_m + probe.y_m
         self._camera = np.array(
