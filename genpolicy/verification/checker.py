@@ -14,7 +14,6 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.attended import Attended
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
@@ -25,6 +24,7 @@ from genpolicy.verification.joined import Joined
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.measured import Measured
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
+from genpolicy.verification.pose import ACTION_DIM
 from genpolicy.verification.report import CheckReport, Violation
 from genpolicy.verification.silence import Silence
 from genpolicy.verification.world_view import WorldView

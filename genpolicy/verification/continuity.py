@@ -7,7 +7,8 @@ first rows were checked from these joints, and from none that it leaves out.
 
 Where no command says where the arm is (a session begins, a person had it, a stop was cleared, a
 reset), the chunk must have been checked from where the newest observation measured the TCP, as
-near as the arm may otherwise be to a command. Where none says, nobody knows.
+near as the arm may otherwise be to a command. Where none says, nobody knows. The joints that were
+measured for a chunk are held against what was seen at that time, of every chunk (`seen`).
 
 After a hold the arm stands, and what goes on from there was checked from rest, never as the rest of
 a chunk. It was held where half a period or more is missing between two actions, and where the
@@ -23,10 +24,10 @@ from itertools import chain, repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import POSITION, ROTATION
-from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.journal_source import Message, floats
 from genpolicy.verification.motion import POSE_TOLERANCE_M, POSE_TOLERANCE_RAD, MotionProof
+from genpolicy.verification.pose import POSITION, ROTATION, angle_rad, turned_by
+from genpolicy.verification.seen import Seen
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
@@ -51,12 +52,12 @@ class Continuity:
         self._accepted_ns: int | None = None
         self._since_ns: list[int] = []
         self._given: deque[tuple[int, Array, Array]] = deque(maxlen=REMEMBERED)
-        self._seen_m: list[float] = []
+        self._seen = Seen()
 
     def see(self, kind: str, m: Message) -> None:
         """Take in where an observation that is used measured the TCP."""
         if kind == "observation" and m["used"]:
-            self._seen_m = m["tcp_m"]
+            self._seen.take(m)
 
     def forget(self, *, blind: bool = False) -> None:
         """Somebody else moves the arm, or has: no command says where it is.
@@ -67,7 +68,7 @@ class Continuity:
         self._last = None
         self._given.clear()
         if blind:
-            self._seen_m = []
+            self._seen.forget()
 
     def hold(self, m: Message) -> None:
         """Take in that the controller held."""
@@ -107,6 +108,7 @@ class Continuity:
         if motion["joints"] != joints or path.size != (behind - first) * joints:
             return  # a violation of its own (P6.ground)
         if begins:
+            yield from self._seen.objections(chunk, self._proof)
             yield from self._from_commands(chunk, m["t"], period_ns, held=stood)
         if first <= row < behind:  # else another one (P1.checked_rows)
             q_rad = path.reshape(-1, joints)[row - first]
@@ -122,10 +124,11 @@ class Continuity:
                 yield RULE, f"{chunk['chunk_id']!r} was checked from another command."
             return
         told_m = floats(told)[POSITION]
-        if len(self._seen_m) != len(told_m):
+        seen_m = self._seen.newest_m
+        if len(seen_m) != len(told_m):
             yield HERE, f"{chunk['chunk_id']!r} goes on from where nobody says that the arm is."
             return
-        away_m = float(np.linalg.norm(told_m - np.array(self._seen_m)))
+        away_m = float(np.linalg.norm(told_m - np.array(seen_m)))
         if not away_m <= limit_m:
             yield HERE, f"{chunk['chunk_id']!r} was checked {away_m:.3g} m from the arm."
 
@@ -145,7 +148,7 @@ class Continuity:
         for back, (q_rad, (action, given_rad)) in enumerate(zip(told_rad, given, strict=False)):
             position, rotation = self._proof.forward(q_rad)
             away_m = float(np.linalg.norm(position - action[POSITION]))
-            turned = float(angle_between(rotation, rotation_from_6d(action[ROTATION])))
+            turned = float(angle_rad(rotation, turned_by(action[ROTATION])))
             if not (away_m <= POSE_TOLERANCE_M and turned <= POSE_TOLERANCE_RAD):
                 yield (
                     COMMANDS,

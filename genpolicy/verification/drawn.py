@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.joined import BLENDS
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.pose import ACTION_DIM
 from genpolicy.verification.rejoined import Made, Rejoined
 
 Array = NDArray[np.float64]

@@ -19,11 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import POSITION
-from genpolicy.contract.rotation import rotation_to_6d
 from genpolicy.verification.arrived import TIMED
 from genpolicy.verification.journal_source import Message, floats
 from genpolicy.verification.motion import MotionProof
+from genpolicy.verification.pose import POSITION, two_columns
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
@@ -114,7 +113,7 @@ class Measured:
             position, rotation = self._proof.forward(q_rad)
             off = max(
                 float(np.max(np.abs(position - tcp_m))),
-                float(np.max(np.abs(rotation_to_6d(rotation) - turned))),
+                float(np.max(np.abs(two_columns(rotation) - turned))),
             )
             if not off <= POSE_TOLERANCE:
                 yield (

@@ -18,12 +18,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
-from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.body import Driven, OwnBody
 from genpolicy.verification.branch import jumped
 from genpolicy.verification.contact import ROUNDING, ExpectedContact
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.pose import GRIPPER, POSITION, ROTATION, angle_rad, turned_by
 from genpolicy.verification.projected import ExpectedProjection
 
 Array = NDArray[np.float64]
@@ -210,7 +209,7 @@ class MotionProof:
     def _reached(self, action: Array) -> Iterator[Finding]:
         away_m = float(np.linalg.norm(self._data.site_xpos[self._tcp] - action[POSITION]))
         rotation = self._data.site_xmat[self._tcp].reshape(3, 3)
-        turned = float(angle_between(rotation, rotation_from_6d(action[ROTATION])))
+        turned = float(angle_rad(rotation, turned_by(action[ROTATION])))
         if not (away_m <= POSE_TOLERANCE_M and turned <= POSE_TOLERANCE_RAD):
             yield "P6.pose", f"Its joints are {away_m:.3g} m and {turned:.3g} rad off its pose."
 
@@ -227,8 +226,8 @@ class MotionProof:
         speed = float(np.linalg.norm(action[POSITION] - before[POSITION])) / period_s
         if not speed <= expected.tcp_speed_m_s * (1 + ROUNDING):
             yield "P6.tcp_speed", f"The TCP moves at {speed:.4g} m/s."
-        rotations = rotation_from_6d(np.stack([before[ROTATION], action[ROTATION]]))
-        turn = float(angle_between(*rotations)) / period_s
+        rotations = turned_by(np.stack([before[ROTATION], action[ROTATION]]))
+        turn = float(angle_rad(*rotations)) / period_s
         if not turn <= expected.tcp_turn_rad_s * (1 + ROUNDING):
             yield "P6.tcp_turn", f"The TCP turns at {turn:.4g} rad/s."
 

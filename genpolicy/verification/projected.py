@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
-from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.contact import ROUNDING
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.pose import GRIPPER, POSITION, ROTATION, angle_rad, turned_by
 
 Finding = tuple[str, str]
 
@@ -47,8 +46,6 @@ class ExpectedProjection:
         moved_m = np.linalg.norm(actions[:, POSITION] - raw[:, POSITION], axis=1)
         if not np.all(moved_m <= self.moved_m * (1 + ROUNDING)):
             yield "P6.projection", f"{name} was moved {np.max(moved_m):.4g} m from what was drawn."
-        turned = angle_between(
-            rotation_from_6d(raw[:, ROTATION]), rotation_from_6d(actions[:, ROTATION])
-        )
+        turned = angle_rad(turned_by(raw[:, ROTATION]), turned_by(actions[:, ROTATION]))
         if not np.all(turned <= self.turned_rad * (1 + ROUNDING)):
             yield "P6.projection", f"{name} was turned {np.max(turned):.4g} rad."

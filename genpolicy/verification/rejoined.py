@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import ACTION_DIM, ROTATION
 from genpolicy.verification.joined import BLENDS
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.pose import ACTION_DIM, ROTATION
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import POSITION
 from genpolicy.verification.joined import LABEL
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.pose import POSITION
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from genpolicy.verification.continuity import COMMANDS, HERE, PACE, RULE, Continuity
+from genpolicy.verification.seen import JOINTS
 
 PERIOD = 50
 
@@ -19,10 +20,14 @@ A, B, C = (told(*[number] * 10) for number in (0.0, 1.0, 2.0))
 SETTINGS = {"period_ns": PERIOD, "maximum_divergence_m": 0.05}
 
 
+def seen(tcp_m, event_ns=0, *, used=True):
+    return {"used": used, "tcp_m": list(tcp_m), "event_time_ns": event_ns}
+
+
 def began(proof=None, tcp_m=(0.0, 0.0, 0.0)):
     """A session in which the arm was seen where a chunk says that it was checked from."""
     own = Continuity(proof)
-    own.see("observation", {"used": True, "tcp_m": list(tcp_m)})
+    own.see("observation", seen(tcp_m))
     return own
 
 
@@ -41,12 +46,12 @@ def accept(t, row, *, arrival=0, action=A):
     return {"t": t, "row": row, "arrival": arrival, "action": action}
 
 
-def rules(*steps, forget=None, seen=(0.0, 0.0, 0.0)):
+def rules(*steps, forget=None, there=(0.0, 0.0, 0.0)):
     own, found = began(), []
     for place, (of, m) in enumerate(steps):
         if place == forget:
             own.forget()
-            own.see("observation", {"used": True, "tcp_m": list(seen)})
+            own.see("observation", seen(there))
         found.append([rule for rule, _ in own.follow(of, m, SETTINGS)])
     return found
 
@@ -78,17 +83,17 @@ def test_another_chunk_was_checked_from_the_last_command():
 
 def test_after_somebody_else_moved_the_arm_no_command_binds():
     start, other = (chunk(), accept(0, 0)), (chunk(last_action=C), accept(50, 0, arrival=1))
-    assert rules(start, other, forget=1, seen=(2.0, 2.0, 2.0))[1] == []
+    assert rules(start, other, forget=1, there=(2.0, 2.0, 2.0))[1] == []
     assert rules(start, (chunk(), accept(20, 0, arrival=1)), forget=1)[1] == [PACE]
 
 
 @pytest.mark.parametrize(
-    ("seen", "found"),
+    ("there", "found"),
     [((0.0, 0.0, 0.05), []), ((0.0, 0.0, 0.0501), [HERE]), ((), [HERE]), ((0.0, 0.0), [HERE])],
 )
-def test_without_a_command_a_chunk_begins_where_the_arm_was_seen(seen, found):
-    own = began(tcp_m=seen)
-    own.see("observation", {"used": False, "tcp_m": [0.0, 0.0, 0.0]})  # it is not believed
+def test_without_a_command_a_chunk_begins_where_the_arm_was_seen(there, found):
+    own = began(tcp_m=there)
+    own.see("observation", seen((0.0, 0.0, 0.0), used=False))  # it is not believed
     own.see("state", {"tcp_m": [0.0, 0.0, 0.0]})
     assert [rule for rule, _ in own.follow(chunk(), accept(0, 0), SETTINGS)] == found
     assert rules((chunk(), accept(0, 0)), (chunk(), accept(50, 1)))[1] == []
@@ -163,7 +168,7 @@ def test_what_is_not_due_and_what_goes_on_at_once_is_no_hold(reason, t):
 class Slide:
     """A robot of one joint that moves its TCP along x; its second number is its branch."""
 
-    expected = SimpleNamespace(branch_rad=0.1, torque_nm=np.ones(2))
+    expected = SimpleNamespace(branch_rad=0.1, torque_nm=np.ones(2), tcp_speed_m_s=2e7)
 
     @staticmethod
     def forward(q_rad):
@@ -174,11 +179,12 @@ def at(x):
     return told(x, 0, 0, 1, 0, 0, 0, 1, 0, 0)
 
 
-def slid(q_cmd, before, *, rows=4):
+def slid(q_cmd, before, *, rows=4, measured=(0.0, 0.0), measured_ns=0):
     """A chunk that goes on from these joints by one in every row."""
     ground = {
         "last_action": at(q_cmd[0]), "q_cmd_rad": told(*q_cmd), "joints": 2,
         "q_before_rad": told(*np.ravel(before)),
+        "q_meas_rad": told(*measured), "measured_ns": measured_ns,
         "q_rad": told(*np.ravel([[q_cmd[0] + 1 + k, q_cmd[1]] for k in range(rows)])),
     }  # fmt: skip
     return {"chunk_id": "c", "checked_rows": [0, rows], "motion": ground}
@@ -191,7 +197,7 @@ def slides(second, *, t=100, after=2, forget=False, hold=""):
         assert not list(own.follow(first, accept(50 * row, row, action=at(row + 1.0)), SETTINGS))
     if forget:
         own.forget()
-        own.see("observation", {"used": True, "tcp_m": [7.0, 0.0, 0.0]})
+        own.see("observation", seen((7.0, 0.0, 0.0), 50))
     own.hold({"t": t, "reason": hold})
     found = own.follow(second, accept(t, 0, arrival=1, action=at(9.0)), SETTINGS)
     return [rule for rule, _ in found]
@@ -231,7 +237,64 @@ def test_a_doubted_clock_held_for_a_command_too_whatever_it_says():
 
 
 def test_who_moved_the_arm_left_the_commands_behind():
-    assert slides(slid((7.0, 3.0), []), forget=True) == []
-    elsewhere = slid((7.0, 0.0), [])
+    there = {"measured": (7.0, 0.0), "measured_ns": 50}
+    assert slides(slid((7.0, 3.0), [], **there), forget=True) == []
+    elsewhere = slid((7.0, 0.0), [], **there)
     elsewhere["motion"]["last_action"] = at(7.001)
     assert slides(elsewhere, forget=True) == [COMMANDS]
+
+
+@pytest.mark.parametrize(
+    ("measured", "found"),
+    [((0.0, 0.0), []), ((9e-6, 0.0), []), ((1.1e-5, 0.0), [JOINTS]), ((-0.1, 0.0), [JOINTS]),
+     ((np.nan, 0.0), [JOINTS])],
+)  # fmt: skip
+def test_the_measured_joints_put_the_tcp_where_it_was_seen(measured, found):
+    """Whether or not a command says where the arm is."""
+    second = slid((2.0, 0.0), [[0.5, 0.0], [1.0, 0.0]], measured=measured)
+    assert slides(second) == found
+    own = began(Slide())
+    first = slid((0.0, 0.0), [], measured=measured)
+    assert [r for r, _ in own.follow(first, accept(0, 0, action=at(1.0)), SETTINGS)] == found
+
+
+@pytest.mark.parametrize(
+    ("at_ns", "measured", "found"),
+    [(60, 0.0, []), (60, 1.1e-5, []), (60, 0.2, []), (60, 0.21, [JOINTS]), (100, 3.0, []),
+     (100, 2.9, [JOINTS]), (149, 3.97, []), (-1, 0.0, [JOINTS])],
+)  # fmt: skip
+def test_what_was_seen_at_the_time_counts_and_later_the_tcp_may_have_gone_on(
+    at_ns, measured, found
+):
+    """As fast as it may, 20 mm a ns; what is seen later than the joints were measured says nothing."""
+    own = began(Slide())
+    own.see("observation", seen((0.0, 0.0, 0.0), 50))
+    own.see("observation", seen((3.0, 0.0, 0.0), 100))
+    own.see("observation", seen((9.0, 0.0, 0.0), 100, used=False))
+    chunk = slid((3.0, 0.0), [], measured=(measured, 0.0), measured_ns=at_ns)
+    assert [r for r, _ in own.follow(chunk, accept(150, 0, action=at(4.0)), SETTINGS)] == found
+
+
+def test_joints_of_a_time_when_nobody_saw_the_arm_are_found():
+    for looks in ([], [seen(())], [seen((0.0, 0.0))], [seen((0.0, 0.0, 0.0), 1)]):
+        own = Continuity(Slide())
+        for look in looks:
+            own.see("observation", look)
+        found = own.follow(slid((0.0, 0.0), []), accept(5, 0, action=at(1.0)), SETTINGS)
+        assert JOINTS in [rule for rule, _ in found]
+    own = began(Slide())
+    own.forget(blind=True)
+    found = own.follow(slid((0.0, 0.0), []), accept(5, 0, action=at(1.0)), SETTINGS)
+    assert [rule for rule, _ in found] == [HERE, JOINTS]
+
+
+def test_only_the_first_row_of_a_chunk_is_held_against_what_was_seen():
+    own, first = began(Slide()), slid((0.0, 0.0), [], measured=(1.0, 0.0))
+    found = [
+        [
+            rule
+            for rule, _ in own.follow(first, accept(50 * row, row, action=at(row + 1.0)), SETTINGS)
+        ]
+        for row in range(3)
+    ]
+    assert found == [[JOINTS], [], []]

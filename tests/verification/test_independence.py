@@ -41,6 +41,19 @@ def test_the_checker_imports_neither_executor_nor_feasibility():
             assert not module.startswith("importlib")
 
 
+def test_the_checker_reads_an_action_in_its_own_words():
+    """No part of it loads, by whatever way, what those read an action by who are checked."""
+    modules = ", ".join(f"genpolicy.verification.{name}" for name in CHECKER if name != "__init__")
+    code = (
+        f"import sys, {modules}; print([m for m in sys.modules "
+        "if m in ('genpolicy.contract.action', 'genpolicy.contract.rotation')])"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.strip() == "[]"
+
+
 def test_a_process_that_runs_the_checker_has_loaded_neither():
     code = (
         "import sys, genpolicy.verification.checker; "
