@@ -35,6 +35,7 @@ class Reason(StrEnum):
     PROJECTION_TOO_LARGE = "projection_too_large"
     WORKSPACE = "workspace"
     UNREACHABLE = "unreachable"
+    START_POSE = "start_pose"
     JOINT_POSITION = "joint_position"
     SINGULAR = "singular"
     BRANCH_JUMP = "branch_jump"

@@ -266,7 +266,7 @@ def test_the_measured_joints_put_the_tcp_where_it_was_seen(measured, found):
 def test_what_was_seen_at_the_time_counts_and_later_the_tcp_may_have_gone_on(
     at_ns, measured, found
 ):
-    """As fast as it may, 20 mm a ns; what is seen later than the joints were measured says nothing."""
+    """As fast as it may, 20 mm a ns; what is seen later than the measurement says nothing."""
     own = began(Slide())
     own.see("observation", seen((0.0, 0.0, 0.0), 50))
     own.see("observation", seen((3.0, 0.0, 0.0), 100))

@@ -37,6 +37,7 @@ WITHIN = 0.98
 DEEPER = np.array([1.0, 1.15, 1.3, 1.5])
 ASIDE_M = (0.01, 0.02, 0.03, 0.04)  # beside the target's middle
 LEAPS = (4, 6, 8, 10)  # times the fastest step
+OTHER_RAD = 0.002  # a millimetre at the TCP, and a step that no rate refuses
 
 
 def too_long(case: Case, checker: FeasibilityChecker) -> Case | None:
@@ -100,7 +101,7 @@ def outside_workspace(case: Case, checker: FeasibilityChecker) -> Case | None:
 def out_of_reach(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The arm is stretched out towards a place that it cannot reach, and told to go on there.
 
-    It is badly conditioned there, and outside the workspace.
+    It is badly conditioned there, outside the workspace, and its last command is out of reach, too.
     """
     cases = []
     for q_rad, place in postures_of(checker.cell).stretched:
@@ -108,7 +109,25 @@ def out_of_reach(case: Case, checker: FeasibilityChecker) -> Case | None:
         there = still(case, checker, q_rad)
         actions = np.tile(action, (len(there.proposal.actions), 1))
         cases.append(there.with_context(last_action=action).with_actions(actions).as_it_is())
-    return alone(checker, cases, "unreachable", ("workspace", "singular"))
+    return alone(checker, cases, "unreachable", ("workspace", "start_pose", "singular"))
+
+
+def other_joints(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still, and the joints that the chunk is checked from put it elsewhere.
+
+    The pose of the last command is the one at which it is seen.
+    """
+    context = case.context
+    here = still(case, checker, context.q_cmd)
+    cases = []
+    for joint in range(len(context.q_cmd)):
+        for way in (OTHER_RAD, -OTHER_RAD):
+            q_rad = np.array(context.q_cmd)
+            q_rad[joint] += way
+            cases.append(
+                here.with_context(q_cmd=q_rad, q_meas=q_rad, q_cmd_history=np.tile(q_rad, (2, 1)))
+            )
+    return alone(checker, cases, "start_pose")
 
 
 def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:

@@ -260,8 +260,10 @@ CORRUPTIONS = (
     Corruption("far_ahead", margin.far_ahead, "representation", "projection_too_large"),
     Corruption("outside_workspace", margin.outside_workspace, "kinematic", "workspace"),
     Corruption(
-        "out_of_reach", margin.out_of_reach, "kinematic", "unreachable", ("workspace", "singular")
+        "out_of_reach", margin.out_of_reach, "kinematic", "unreachable",
+        ("workspace", "start_pose", "singular"),
     ),
+    Corruption("other_joints", margin.other_joints, "kinematic", "start_pose"),
     Corruption("awkward_posture", margin.awkward_posture, "kinematic", "joint_position"),
     Corruption("singular_posture", margin.singular_posture, "kinematic", "singular"),
     Corruption(

@@ -34,7 +34,7 @@ NO_DISTANCE = frozenset({
 })  # fmt: skip
 """Checks to which nothing comes close: they ask for a form, for what must be equal, or for an
 order that the newest observation keeps with 0."""
-TWO_UNITS = frozenset({Reason.PROJECTION_TOO_LARGE, Reason.UNREACHABLE})
+TWO_UNITS = frozenset({Reason.PROJECTION_TOO_LARGE, Reason.UNREACHABLE, Reason.START_POSE})
 """Checks whose margin is in m of one chunk and in rad of another, so that it compares with none.
 
 How far projection moved and turned has columns of its own.

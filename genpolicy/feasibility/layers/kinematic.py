@@ -1,5 +1,9 @@
 """The kinematic layer: in the workspace, reachable, off limits and singularity, on one branch?
 
+A chunk says where the motion begins twice: by the joints of the last command and by its pose. All
+that is asked of joints begins at the former, and executor and stub, which know no kinematics, hold
+the latter against the last command or against where the arm is seen. So the two must be one.
+
 A pose has several joint positions. Each row's are sought from the last command on, and from other
 seeds where that fails, so that a row may have an elbow or a wrist on the other side than the row
 before it. Such a jump is no motion of the tool, however slowly it were made.
@@ -8,7 +12,8 @@ before it. Such a jump is no motion of the tool, however slowly it were made.
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import POSITION
+from genpolicy.contract.action import POSITION, ROTATION
+from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.frames import pose_error
@@ -26,6 +31,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     workspace           min over x, y, z of (p - lower, upper - p), m; rounding of 1 nm is free
     unreachable         min of (tolerance - position error, m) and (tolerance - rotation error,
                         rad) of inverse kinematics
+    start_pose          the same of the joints of the last command and its pose
     joint_position      min over joints of (q - lower, upper - q) - joint_margin_rad, rad
     singular            limit - largest over smallest singular value of the TCP Jacobian, 1
     branch_jump         limit - largest turn of a joint from the last command, or the row before,
@@ -46,10 +52,22 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     return Margins({
         "workspace": inside.min(axis=(1, 2)) + POSITION_ROUNDING_M,
         "unreachable": reach.min(axis=1),
+        "start_pose": _begun(batch, cell),
         "joint_position": room.min(axis=(1, 2)) - settings.joint_margin_rad,
         "singular": settings.condition_limit - condition.max(axis=1),
         "branch_jump": settings.branch_limit_rad - _jumps(batch, cell).max(axis=1),
     })  # fmt: skip
+
+
+def _begun(batch: Batch, cell: Cell) -> Array:
+    """What is left of the tolerances between the last command's joints and its pose. (B,)."""
+    settings, told = cell.settings, batch.last_action
+    position, rotation = cell.kinematics.forward(batch.q_cmd_rad)
+    away_m = np.linalg.norm(position - told[:, POSITION], axis=1)
+    turned = angle_between(rotation, rotation_from_6d(told[:, ROTATION]))
+    return np.minimum(
+        settings.position_tolerance_m - away_m, settings.rotation_tolerance_rad - turned
+    )
 
 
 def _jumps(batch: Batch, cell: Cell) -> Array:

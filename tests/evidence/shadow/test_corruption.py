@@ -89,7 +89,7 @@ def test_golden_the_eight_checks_that_cannot_stand_alone_and_who_refuses_with_th
     behind = {item.check: set(item.behind) for item in CORRUPTIONS if item.behind}
     assert len(behind) == 8 and behind == {
         "rotation_degenerate": {"rotation_not_orthonormal"},
-        "unreachable": {"workspace", "singular"},
+        "unreachable": {"workspace", "start_pose", "singular"},
         "branch_jump": {
             *FAST, "joint_torque", "payload_torque", "measured_velocity", "measured_acceleration",
             "swept_collision", "measured_collision",

@@ -16,6 +16,7 @@ def cases(checker, kit):
     return {
         "workspace": kit.Outside(kit.line(start, (0.40, 0.0, 0.285)), ctx),
         "unreachable": kit.Outside(kit.line(start, (0.95, 0.0, 0.15)), ctx, others=None),
+        "start_pose": kit.Outside(good, replace(ctx, q_cmd=ctx.q_cmd + 0.0005)),
         "joint_position": kit.Outside(
             kit.line(start, (0.335, 0, 0.06)), ctx, settings={"joint_margin_rad": 0.2}
         ),
@@ -24,7 +25,9 @@ def cases(checker, kit):
     }
 
 
-@pytest.mark.parametrize("name", ["workspace", "joint_position", "singular", "branch_jump"])
+@pytest.mark.parametrize(
+    "name", ["workspace", "start_pose", "joint_position", "singular", "branch_jump"]
+)
 def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
     kit.turns_red(build, name, cases[name])
 
@@ -56,6 +59,36 @@ def test_the_margins_are_distances_to_the_limits(checker, cell, kit):
     worst = max(np.linalg.cond(jacobian) for jacobian in arm.jacobian(q))
     assert found["singular"][0] == pytest.approx(30 - worst, rel=1e-6)
     assert 0 <= found["unreachable"][0] <= 1e-6
+    assert 0 <= found["start_pose"][0] <= 1e-6
+
+
+def test_the_last_command_is_one_place_by_its_joints_and_by_its_pose(checker, cell, kit):
+    """Off by more than inverse kinematics may miss, in place or turn, or turned by no rotation."""
+    actions, ctx = kit.line(kit.START, kit.SIDE), kit.context(checker, kit.START)
+
+    def left(**changes):
+        batch = kit.solved(kit.batch_of((actions, replace(ctx, **changes))), cell)
+        return margins(batch, cell).values["start_pose"][0]
+
+    def told(columns, number):
+        action = np.array(ctx.last_action)
+        action[columns] += number
+        return action
+
+    assert left(last_action=told(0, 1e-4)) == pytest.approx(1e-6 - 1e-4, abs=1e-6)
+    turned = np.array(ctx.last_action)
+    turn = np.array([[1, -1e-4, 0], [1e-4, 1, 0], [0, 0, 1]])
+    turned[3:9] = (turned[3:9].reshape(2, 3) @ turn.T).ravel()
+    assert left(last_action=turned) == pytest.approx(1e-6 - 1e-4, abs=1e-6)
+    assert left(last_action=told(slice(3, 9), np.zeros(6))) >= 0
+    nothing = np.array(ctx.last_action)
+    nothing[3:9] = 0.0
+    assert np.isnan(left(last_action=nothing)), "unknown, which does not pass"
+    elbow = ctx.q_cmd + 0.001
+    assert left(q_cmd=elbow) < -1e-4
+    position, rotation = cell.kinematics.forward(elbow[None])
+    moved = np.concatenate([position[0], rotation[0].T[:2].ravel(), ctx.last_action[9:]])
+    assert left(q_cmd=elbow, last_action=moved) == pytest.approx(1e-6, abs=1e-9)
 
 
 def turned_over(ctx):
