@@ -17,7 +17,7 @@ from genpolicy.feasibility.verdict import LayerOutcome
 
 def test_the_table_holds_every_reason_once_and_layers_in_order():
     assert [check.name for check in CHECKS] == list(Reason)
-    assert len(Reason) == 41
+    assert len(Reason) == 42
     assert list(dict.fromkeys(check.layer for check in CHECKS)) == list(LAYERS)
     assert sorted(CHECKS, key=lambda check: LAYERS.index(check.layer)) == list(CHECKS)
 
