@@ -81,7 +81,7 @@ CLAUSES_ASKED_FOR = {
     "controller_mode": ("unknown",),
     "scene": ("unseen", "unsaid", "other_bodies"),
     "continuity": (
-        "here", "unseen", "hold", "first_row", "last_command", "rest", "commands_before",
+        "here", "unseen", "motion", "hold", "first_row", "last_command", "rest", "commands_before",
         "watchdog", "doubt", "person", "reset", "stop",
     ),
 }  # fmt: skip

@@ -4,7 +4,8 @@ It checked the ways between the rows of a chunk, and the one from the last comma
 moment to the first row that it was asked about. After a row that was left out, another command in
 between, or a hold, nobody has checked anything, and the chunk needs a new admission. Where no
 command says where the arm is (in a new session, after a person, a stop or a reset), the chunk was
-checked from where it is seen. Executor and controller stub each keep their own.
+checked from where it is seen, and from a motion that is known. Executor and controller stub each
+keep their own.
 
 A hold is half a period more than the one that a command lasts, by the clock; and one by the
 watchdog, or for a clock that is doubted, however short, since that clock measured nothing. A loop
@@ -98,7 +99,7 @@ class Continuity:
             return False
         context = getattr(chunk, "context", None)
         if last is None:
-            return begins_here(context, view)
+            return begins_here(context, view) and moves_known(context)
         told = bytes_of(getattr(context, "last_action", None))
         before = self._commands - 1 + holds
         return told == last.action and rests(context, holds) and knows(context, before)
@@ -152,6 +153,15 @@ def knows(context: object, before: int) -> bool:
     except (TypeError, ValueError):
         return before <= 0
     return (len(told) if told.ndim else 0) >= min(before, BOUNDARY_COMMANDS)
+
+
+def moves_known(context: object) -> bool:
+    """Whether a chunk says how the arm moved where it begins: by commands before, or as measured.
+
+    Asked where no command says it. Where neither is told feasibility asks for no acceleration: the
+    arm could be told to reach the speed of its joints within one period.
+    """
+    return getattr(context, "dq_meas", None) is not None or knows(context, BOUNDARY_COMMANDS)
 
 
 def bytes_of(values: object) -> bytes:

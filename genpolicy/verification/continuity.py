@@ -7,7 +7,8 @@ first rows were checked from these joints, and from none that it leaves out.
 
 Where no command says where the arm is (a session begins, a person had it, a stop was cleared, a
 reset), the chunk must have been checked from where the newest observation measured the TCP, as
-near as the arm may otherwise be to a command. Where none says, nobody knows. The joints that were
+near as the arm may otherwise be to a command, and know how it moved there, by two commands before
+or as measured. Where none says, nobody knows. The joints that were
 measured for a chunk are held against what was seen at that time, of every chunk (`seen`).
 
 After a hold the arm stands, and what goes on from there was checked from rest, never as the rest of
@@ -131,6 +132,10 @@ class Continuity:
         away_m = float(np.linalg.norm(told_m - np.array(seen_m)))
         if not away_m <= limit_m:
             yield HERE, f"{chunk['chunk_id']!r} was checked {away_m:.3g} m from the arm."
+        motion = chunk["motion"]
+        before = len(motion["q_before_rad"]) // max(len(motion["q_cmd_rad"]), 1)
+        if motion["dq_meas_rad_s"] is None and before < REMEMBERED - 1:
+            yield HERE, f"{chunk['chunk_id']!r} goes on from a motion that nobody knows."
 
     def _from_commands(
         self, chunk: Message, now_ns: int, period_ns: int, *, held: bool

@@ -206,6 +206,22 @@ def test_a_chunk_was_checked_with_the_commands_before_the_last(given, told):
     assert follows(continuity, chunk(ACTION.copy(), np.zeros((0, 2))), 0, 0, 50)
 
 
+@pytest.mark.parametrize(
+    ("before", "velocity", "begins"),
+    [((), None, False), (((0.0, 0.0),), None, False), (((0.0, 0.0),) * 2, None, True),
+     ((), (0.0, 0.0), True)],
+)  # fmt: skip
+def test_where_no_command_says_how_the_arm_moves_a_chunk_knows_it(before, velocity, begins):
+    """By two commands before, or as it was measured; else feasibility asked for no acceleration."""
+    own = chunk(before=before)
+    own.context.dq_meas = velocity
+    assert follows(Continuity(), own, 0, 0) is begins
+    assert follows(after(chunk()), own, 0, 0), "one command alone has none before it"
+    stopped = after(chunk())
+    stopped.forget()
+    assert follows(stopped, own, 0, 0) is begins
+
+
 @pytest.mark.parametrize("told", [None, "moving", [[0.0], [0.0, 1.0]]])
 def test_a_history_that_cannot_be_read_is_none(told):
     assert not knows(SimpleNamespace(q_cmd_history=told), 1) and knows(None, 0)

@@ -36,6 +36,7 @@ def chunk(first=0, last_action=A, motion=True, before=(0.0, 0.0)):
         "last_action": last_action,
         "q_cmd_rad": told(0.0, 0.0),
         "q_before_rad": told(*before),
+        "dq_meas_rad_s": told(0.0, 0.0),
     }
     return {
         "chunk_id": "c", "checked_rows": [first, 16], "motion": ground if motion else None,
@@ -97,6 +98,21 @@ def test_without_a_command_a_chunk_begins_where_the_arm_was_seen(there, found):
     own.see("state", {"tcp_m": [0.0, 0.0, 0.0]})
     assert [rule for rule, _ in own.follow(chunk(), accept(0, 0), SETTINGS)] == found
     assert rules((chunk(), accept(0, 0)), (chunk(), accept(50, 1)))[1] == []
+
+
+@pytest.mark.parametrize(
+    ("before", "velocity", "found"),
+    [((), None, [HERE]), ((0.0, 0.0), None, [HERE]), ((0.0,) * 4, None, []), ((), told(0, 0), []),
+     ((0.0, 0.0), told(3, 0), [])],
+)  # fmt: skip
+def test_without_a_command_a_chunk_knows_how_the_arm_moved(before, velocity, found):
+    """By two commands before or as measured; of neither no acceleration was ever asked."""
+    first = chunk(before=before)
+    first["motion"]["dq_meas_rad_s"] = velocity
+    assert rules((first, accept(0, 0))) == [found]
+    start = (chunk(), accept(0, 0))
+    assert rules(start, (first, accept(50, 0, arrival=1))) == [[], []], "behind a command"
+    assert rules(start, (first, accept(50, 0, arrival=1)), forget=1) == [[], found]
 
 
 def test_what_another_session_saw_says_nothing():
@@ -184,7 +200,7 @@ def slid(q_cmd, before, *, rows=4, measured=(0.0, 0.0), measured_ns=0):
     ground = {
         "last_action": at(q_cmd[0]), "q_cmd_rad": told(*q_cmd), "joints": 2,
         "q_before_rad": told(*np.ravel(before)),
-        "q_meas_rad": told(*measured), "measured_ns": measured_ns,
+        "q_meas_rad": told(*measured), "measured_ns": measured_ns, "dq_meas_rad_s": told(0, 0),
         "q_rad": told(*np.ravel([[q_cmd[0] + 1 + k, q_cmd[1]] for k in range(rows)])),
     }  # fmt: skip
     return {"chunk_id": "c", "checked_rows": [0, rows], "motion": ground}

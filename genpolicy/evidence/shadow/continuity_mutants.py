@@ -124,6 +124,17 @@ class WithoutUnseen(Continuity):
         return super().follows(chunk, about, row, now_ns, view)
 
 
+class WithoutMotion(Continuity):
+    """Where no command says how the arm moves, a chunk begins from any motion, known or not."""
+
+    def follows(self, chunk: Any, about: Chunk, row: int, now_ns: int, view: View) -> bool:
+        """Takes the arm of a chunk that begins for one that was measured at rest."""
+        if self._last is None:
+            context = replace(chunk.context, dq_meas=np.zeros_like(chunk.context.q_meas))
+            chunk = replace(chunk, context=context)
+        return super().follows(chunk, about, row, now_ns, view)
+
+
 def _told_m(chunk: Any) -> Position:
     x, y, z = chunk.context.last_action[POSITION]
     return x, y, z
@@ -229,9 +240,17 @@ def _unseen(rig: Rig) -> None:
     rig.tick(2)
 
 
+def _from_unknown_motion(rig: Rig) -> None:
+    """The first chunk of a session knows one command before, and no measured velocity."""
+    rig.observe()
+    rig.deliver(rig.chunk(context=replace(rig.context(), q_cmd_history=np.zeros((1, 1)))))
+    rig.tick(2)
+
+
 CLAUSES = {
     "here": Clause(WithoutHere, Trial(_elsewhere)),
     "unseen": Clause(WithoutUnseen, Trial(_unseen)),
+    "motion": Clause(WithoutMotion, Trial(_from_unknown_motion)),
     "hold": Clause(WithoutHold, Trial(_almost_two_periods_later)),
     "first_row": Clause(WithoutFirstRow, Trial(_at_its_second_row)),
     "last_command": Clause(WithoutLastCommand, Trial(_second(last_action=np.full(10, 0.5)))),
@@ -258,8 +277,8 @@ CLAUSES = {
         )
     },
 }  # fmt: skip
-"""By name. Two ask where the arm is, two of rows, three of what a chunk was checked from, two of
-holds that no clock tells, and three of who moved the arm."""
+"""By name. Two ask where the arm is, one how it moves, two of rows, three of what a chunk was
+checked from, two of holds that no clock tells, and three of who moved the arm."""
 
 
 def continuity_mutants(checks: Checks = CHECKS) -> list[ExecutionMutant]:

@@ -23,7 +23,7 @@ def test_every_clause_is_detected_by_the_rule_of_continuity_or_by_what_is_untold
     assert [row.check for row in rows] == [f"{ROW}:{name}" for name in CLAUSES]
     assert all(row.detected and row.slipped == row.violations_unchanged == 0 for row in rows)
     for row, name in zip(rows, CLAUSES, strict=True):
-        rule = "P5.here" if name in ("here", "unseen") else "P5.continuity"
+        rule = "P5.here" if name in ("here", "unseen", "motion") else "P5.continuity"
         assert row.rules == [UNTOLD if name in UNTOLD_ALONE else rule]
 
 
