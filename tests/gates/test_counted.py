@@ -67,7 +67,7 @@ ALL_OF = {
     ("A", "factors_isolated"): "5 variants",
     ("B", "samples_difference"): "8 samples",
     ("C", "checker_violations"): "1000 actions",
-    ("C", "mutants_undetected"): "264 mutants",
+    ("C", "mutants_undetected"): "265 mutants",
     ("D", "checker_violations"): "5000 actions",
 }
 """By hand, from the evidence: what is asked of everything that there is, and how much that is."""
