@@ -65,9 +65,10 @@ def _begun(batch: Batch, cell: Cell) -> Array:
     position, rotation = cell.kinematics.forward(batch.q_cmd_rad)
     away_m = np.linalg.norm(position - told[:, POSITION], axis=1)
     turned = angle_between(rotation, rotation_from_6d(told[:, ROTATION]))
-    return np.minimum(
+    left: Array = np.minimum(
         settings.position_tolerance_m - away_m, settings.rotation_tolerance_rad - turned
     )
+    return left
 
 
 def _jumps(batch: Batch, cell: Cell) -> Array:
