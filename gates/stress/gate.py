@@ -23,6 +23,7 @@ from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.planned import planner_said
 from gates.stress.rollouts import JOURNALS, REFUSED, StressSettings
+from gates.stress.simple import handicaps_said, require_met
 from gates.stress.stopped import stopped_by
 from gates.stress.stopping import stopped_said
 from gates.stress.trainings import trainings_said
@@ -57,6 +58,7 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     """
     if stopped := stopped_by(evidence, settings, candidate, GAIN):
         return stopped
+    require_met(evidence, settings)
     differences = {
         baseline: paired_differences(evidence, settings, candidate, baseline)
         for baseline in settings.baselines
@@ -107,8 +109,8 @@ def _decide(judged: Judged) -> Decision:
 
 def _said(judged: Judged) -> list[str]:
     """Of who was stopped, the planner, what was never touched or visited, clocks, monitors."""
-    beside = (stopped_said, planner_said, contact_said, visited_said, clocks_said, monitors_said)
-    return [text for of in (trainings_said, *beside) for text in of(judged)]
+    beside = (planner_said, handicaps_said, contact_said, visited_said, clocks_said, monitors_said)
+    return [text for of in (trainings_said, stopped_said, *beside) for text in of(judged)]
 
 
 def _worded(settings: StressSettings, caveat: str) -> str:

@@ -207,21 +207,30 @@ def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str
 )
 def conservation_error(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Actions unaccounted for: generated - executed - discarded - queued, and by reason."""
+    error = unaccounted(evidence, settings, candidate)
+    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
+
+
+def unaccounted(evidence: Evidence, settings: StressSettings, method: str) -> float:
+    """Actions of a method that vanished or appeared, over the conditions.
+
+    Raises:
+        MissingEvidenceError: A planned condition has no row, or nothing was generated.
+    """
     names = ("generated", "executed", "discarded", "queued")
     path = f"{STRESS}/conservation.parquet"
-    rows = evidence.of(path, ConservationRow, candidate)
+    rows = evidence.of(path, ConservationRow, method)
     require_played(rows, "perturbation", settings.perturbations)
     generated, executed, discarded, queued = (counts(rows, name) for name in names)
     if generated.sum() <= 0:
         raise MissingEvidenceError("nothing was generated")
     error = float(np.abs(generated - executed - discarded - queued).sum())
-    reasons = evidence.of(f"{STRESS}/counts.parquet", StressCountRow, candidate)
+    reasons = evidence.of(f"{STRESS}/counts.parquet", StressCountRow, method)
     by_reason = (
         reasons.assign(count=counts(reasons, "count")).groupby("perturbation")["count"].sum()
     )
     stated = rows.assign(discarded=discarded).groupby("perturbation")["discarded"].sum()
-    error += float(stated.sub(by_reason, fill_value=0.0).abs().sum())
-    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
+    return error + float(stated.sub(by_reason, fill_value=0.0).abs().sum())
 
 
 @criterion(
