@@ -80,6 +80,10 @@ def _with_planner(root, every=1):
     """
     evidence.write_params(root, lambda p: p["stress"]["baselines"].append(PLANNER))
 
+    def counted_beside(frame):
+        own = frame[frame["method"] == "chunked_bc"].assign(method=PLANNER)
+        return pd.concat([frame, own], ignore_index=True)
+
     def beside(frame):
         own = frame[frame["method"] == "bc"].assign(method=PLANNER)
         own["success"] = own["start"] % every == 0
@@ -87,6 +91,8 @@ def _with_planner(root, every=1):
         return pd.concat([frame, own], ignore_index=True)
 
     evidence.edit_table(root, TABLE, beside)
+    for name in ("stub", "conservation", "counts"):
+        evidence.edit_table(root, f"stress/{name}.parquet", counted_beside)
     return Evidence(root), settings_of(root, "D")
 
 
