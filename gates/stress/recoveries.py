@@ -22,6 +22,8 @@ PUSH = "push"
 PERTURBED = (DRILL, PUSH)
 """Conditions that put the arm where the policy did not mean to be, on every start."""
 ROLLOUT = ["seed", "perturbation", "start"]
+HANDED_BACK = "handed_back"
+"""How an entry ended whose last primitive reached its goal (`RecoveryRow`)."""
 RECOVERED = is_one("recovered", True)
 """Of an entry into recovery."""
 
@@ -34,7 +36,8 @@ def recoveries(
     Arguments as of `rollouts`.
 
     Raises:
-        MissingEvidenceError: As `rollouts`, or a rollout and its entries differ.
+        MissingEvidenceError: As `rollouts`, a rollout and its entries differ, or an entry counts as
+            recovered by which nothing was.
     """
     rolled = rollouts(evidence, settings, method, folder=folder)
     path = f"{folder}/{RECOVERED_ROWS}"
@@ -48,6 +51,7 @@ def recoveries(
         own = evidence.of(path, RecoveryRow, method)
     if len(own):
         own = own[own["perturbation"].isin(settings.perturbations)]
+        _require_recovered(own, method)
     stated = dict(zip(_keys(began), flags(began, "recovered"), strict=True))
     last = own.sort_values("recovery").drop_duplicates(ROLLOUT, keep="last") if len(own) else own
     found = dict(zip(_keys(last), flags(last, "recovered"), strict=True)) if len(own) else {}
@@ -59,6 +63,27 @@ def recoveries(
             "recovery say otherwise whether it recovered"
         )
     return own
+
+
+def _require_recovered(entries: pd.DataFrame, method: str) -> None:
+    """What counts as recovered is judged, and what `RecoveryRow` asks of it stands beside it.
+
+    Raises:
+        MissingEvidenceError: An entry counts and did not hand back, helped by samples alone, was
+            followed by no command of the policy or by no success, or by another in its phase.
+    """
+    later = entries.sort_values("recovery")
+    again = later.duplicated([*ROLLOUT, "phase"], keep="last").reindex(entries.index).to_numpy()
+    helped = (entries["ended"] == HANDED_BACK).to_numpy() & ~flags(entries, "resampled_only")
+    helped &= flags(entries, "taken_over") & flags(entries, "succeeded")
+    wrong = entries[flags(entries, "recovered") & (again | ~helped)]
+    if len(wrong):
+        row = wrong.iloc[0]
+        raise MissingEvidenceError(
+            f"rollout {method}, seed {row['seed']}, {row['perturbation']}, start {row['start']}: "
+            f"entry {row['recovery']} into recovery counts as recovered, and was not by what is "
+            "told of it"
+        )
 
 
 def _keys(rows: pd.DataFrame) -> list[tuple[int, str, int]]:

@@ -2,6 +2,7 @@
 
 import evidence
 import pytest
+from editing import cells
 
 from gates.evidence import Evidence
 from gates.pages.figures import draw_all
@@ -50,6 +51,8 @@ def test_how_entries_ended_otherwise_is_counted(ladder):
             resampled_only=frame["resampled_only"].mask(own, True),
         )
 
+    insert = lambda f: (f["method"] == "act") & (f["start"] % 3 == 2)  # noqa: E731
+    evidence.edit_table(ladder, "stress/rollouts.parquet", cells("recovered", False, where=insert))
     evidence.edit_table(ladder, TABLE, ends)
     by_phase, _ = drawn(ladder, judge(ladder, "D"))
     heads, *lines = by_phase.listed

@@ -37,12 +37,55 @@ def test_every_entry_of_the_planned_conditions_comes(ladder):
     [
         lambda f: f[f["start"] != 3],
         lambda f: f.assign(recovered=f["recovered"] ^ (f["start"] == 3)),
-        lambda f: evidence.pd.concat([f, f[f["start"] == 3].assign(recovery=1, recovered=False)]),
+        lambda f: evidence.pd.concat(
+            [f, f[f["start"] == 3].assign(recovery=1, recovered=False, phase="later")]
+        ),
     ],
 )
 def test_a_rollout_and_its_entries_that_differ_are_no_evidence(ladder, change):
     evidence.edit_table(ladder, TABLE, change)
     with pytest.raises(MissingEvidenceError, match=rf"{DRILL}, start 3: it and its entries"):
+        entries(ladder)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"ended": "person"},
+        {"ended": "episode_over"},
+        {"resampled_only": True},
+        {"taken_over": False},
+        {"succeeded": False},
+    ],
+)
+def test_what_counts_as_recovered_and_was_not_is_no_evidence(ladder, told):
+    def change(frame):
+        mine = of(frame) & (frame["start"] == 5)
+        return frame.assign(**{k: frame[k].mask(mine, v) for k, v in told.items()})
+
+    evidence.edit_table(ladder, TABLE, change)
+    with pytest.raises(MissingEvidenceError, match=rf"{DRILL}, start 5: entry 0 .* and was not"):
+        entries(ladder)
+    assert len(entries(ladder, "bc")) == evidence.STARTS, "of another method nothing is wrong"
+    evidence.edit_table(ladder, ROLLOUTS, cells("recovered", False, where=of))
+    evidence.edit_table(ladder, TABLE, change)
+    assert len(entries(ladder)) == evidence.STARTS, "what does not count may end as it likes"
+
+
+@pytest.mark.parametrize(("phase", "believed"), [("align", True), ("approach", False)])
+def test_a_phase_that_had_to_be_recovered_again_was_not_recovered_before(ladder, phase, believed):
+    """Whatever order the rows come in; start 3 began in the approach."""
+
+    def twice(frame):
+        first = frame[frame["start"] == 3].assign(phase="approach")
+        later = first.assign(recovery=1, phase=phase)
+        return evidence.pd.concat([later, frame[frame["start"] != 3], first], ignore_index=True)
+
+    evidence.edit_table(ladder, TABLE, twice)
+    if believed:
+        assert len(entries(ladder)) == evidence.STARTS + 1
+        return
+    with pytest.raises(MissingEvidenceError, match=rf"{DRILL}, start 3: entry 0 into recovery"):
         entries(ladder)
 
 
