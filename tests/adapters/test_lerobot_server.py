@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import sys
 import types
 from pathlib import Path
@@ -97,6 +98,7 @@ def adapter(monkeypatch):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     monkeypatch.setitem(sys.modules, "lerobot.configs.policies", config)
     monkeypatch.setitem(sys.modules, "lerobot.policies.factory", factory)
+    monkeypatch.setenv("HF_HUB_OFFLINE", "0")  # given back behind the test
     place = ROOT / "adapters" / "lerobot_server.py"
     spec = importlib.util.spec_from_file_location("lerobot_server", place)
     module = importlib.util.module_from_spec(spec)
@@ -129,6 +131,10 @@ def answered(adapter, served, data):
     """Through the adapter's own reading and writing of bytes."""
     message = msgpack.unpackb(data, object_hook=adapter.unpacked)
     return msgpack.packb(served.answer(message), default=adapter.packed)
+
+
+def test_nothing_is_fetched_beside_the_folder(adapter):
+    assert os.environ["HF_HUB_OFFLINE"] == "1"
 
 
 def test_it_is_read_as_it_reads(adapter, served, kind, asked):

@@ -6,6 +6,7 @@ from pathlib import Path
 from safetensors import SafetensorError, safe_open
 
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ScriptedEntry
+from genpolicy.candidates.hosts.lerobot_steps import require_steps
 from genpolicy.candidates.wire.entry import Entry
 from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.integrity.documents import read_json
@@ -21,7 +22,8 @@ def require_forms(entry: Entry, folder: Path) -> None:
         folder: Of the entry's file.
 
     Raises:
-        ConfigError: A module without the function; documents or weights of LeRobot that are none.
+        ConfigError: A module without the function; documents or weights of LeRobot that are none,
+            or processors of it that could run code.
     """
     if isinstance(entry, ScriptedEntry):
         _require_function(folder / entry.file, entry.function.partition(":")[2])
@@ -29,6 +31,7 @@ def require_forms(entry: Entry, folder: Path) -> None:
         for name in entry.essential(folder):
             read = _require_document if name.endswith(".json") else _require_weights
             read(folder / name)
+        require_steps(entry, folder)
 
 
 def _require_function(path: Path, name: str) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
 from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
+from genpolicy.candidates.hosts.lerobot_steps import require_steps
 from genpolicy.candidates.wire.channels import columns_of, widths_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
@@ -38,7 +39,7 @@ def as_server(
 
     Raises:
         ConfigError: Nothing on this machine runs it, or a checkpoint or policy of LeRobot takes or
-            gives something else than it says.
+            gives something else than it says, or has processors that could run code.
         ContractError: It names what the observation does not have.
     """
     if isinstance(entry, ServerEntry):
@@ -47,6 +48,7 @@ def as_server(
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
     if isinstance(entry, LeRobotEntry):
         require_shapes(entry, path.resolve().parent, contract)
+        require_steps(entry, path.resolve().parent)
         command = _lerobot(entry)
     else:
         command = _own(entry, path, contract)
