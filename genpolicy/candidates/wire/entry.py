@@ -12,7 +12,8 @@ from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import read_verified, sha256_bytes
 
-NAME = r"^[a-z][a-z0-9_]{0,63}$"
+Name = Annotated[str, Field(pattern=r"^[a-z](_?[a-z0-9])*$", max_length=64)]
+"""Names of files join a name and a condition by two underscores, and are parted there again."""
 PORT = "{port}"
 RESERVED = "genpolicy"
 CPU = "cpu"
@@ -182,10 +183,9 @@ class Output(Settings):
             raise ValueError("the motion absolute is in the frame robot_base")
         if self.motion == "absolute" and self.rotation is None and self.joints is None:
             raise ValueError("the motion absolute says its rotation")
-        if self.anchor is None and self.motion != "absolute":
-            raise ValueError(
-                f"the motion {self.motion} has an anchor, the pose that it starts from"
-            )
+        if (self.anchor is None) != (self.motion == "absolute"):
+            has = "no anchor" if self.anchor else "an anchor, the pose that it starts from"
+            raise ValueError(f"the motion {self.motion} has {has}")
         if len(set(self.columns)) != len(self.columns):
             raise ValueError("each column means one thing")
         return self
@@ -222,7 +222,7 @@ class Entry(Settings):
         timeout_s: How long an answer is waited for before it counts as none.
     """
 
-    name: str = Field(pattern=NAME)
+    name: Name
     kind: str
     author: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
     files: dict[str, Annotated[str, Field(pattern=DIGEST)]] = Field(default_factory=dict)
@@ -232,7 +232,7 @@ class Entry(Settings):
     action: Output
     stochastic: bool = True
     declared: Declared | None = None
-    samplers: dict[Annotated[str, Field(pattern=NAME)], Choice] = Field(default_factory=dict)
+    samplers: dict[Name, Choice] = Field(default_factory=dict)
     start_timeout_s: float = Field(default=60.0, gt=0, le=600)
     timeout_s: float = Field(default=2.0, gt=0, le=60)
 

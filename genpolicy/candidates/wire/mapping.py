@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 POSITION_SIZE, ROTATION_SIZE = 3, 6
+METRE, PURE = "m", "1"
+UNIT_OF_SIZE = {POSITION_SIZE: METRE, ROTATION_SIZE: PURE}
+"""Of the numbers of an anchor, by how many there are."""
 
 
 class Inputs:
@@ -76,8 +79,8 @@ class Outputs:
             nobody knows it.
 
     Raises:
-        ContractError: An anchor that the observation does not have, or other joints than the
-            robot's.
+        ContractError: An anchor that the observation does not have, or of another unit, or other
+            joints than the robot's.
     """
 
     def __init__(
@@ -90,8 +93,8 @@ class Outputs:
             self._joints = JointSpace(output.joints, output, contract, scene)
         elif output.anchor is not None:
             self._anchor = (
-                _sized(output.anchor.position, contract, "action.anchor.position", POSITION_SIZE),
-                _sized(output.anchor.rotation, contract, "action.anchor.rotation", ROTATION_SIZE),
+                _anchor(output.anchor.position, contract, "action.anchor.position", POSITION_SIZE),
+                _anchor(output.anchor.rotation, contract, "action.anchor.rotation", ROTATION_SIZE),
             )
 
     def mapped(self, chunks: Array, conditioned_by: Array) -> Array:
@@ -230,22 +233,37 @@ MATRIX_TOLERANCE = 1e-2
 
 def _lengths(contract: ObservationContract) -> NDArray[np.bool_]:
     """Which numbers of the observation are lengths."""
-    return np.array([
-        channel.unit == "m" or component.endswith("_m")
+    return np.array([unit == METRE for unit in _units(contract)])
+
+
+def _units(contract: ObservationContract) -> list[str]:
+    """Unit of each number of the observation."""
+    return [
+        METRE if component.endswith("_m") else channel.unit
         for channel in contract.channels
         for component in channel.components
-    ])  # fmt: skip
+    ]
 
 
-def _sized(
+def _anchor(
     names: Sequence[str] | None, contract: ObservationContract, where: str, size: int
 ) -> Indices:
+    """Where the position in m, or the rotation in pure numbers, of an anchor is observed."""
     columns = columns_of(names or (), contract, where=where)
     if len(columns) != size:
         raise ContractError(
             where=f"{where} of the candidate",
             found=f"{len(columns)} numbers",
             expected=f"{size}",
+            action="Name the pose that relative actions start from.",
+        )
+    units, expected = _units(contract), UNIT_OF_SIZE[size]
+    if other := [column for column in columns if units[column] != expected]:
+        named = contract.component_names[other[0]]
+        raise ContractError(
+            where=f"{where} of the candidate",
+            found=f"{named} in {units[other[0]]}",
+            expected=f"{size} numbers in {expected}",
             action="Name the pose that relative actions start from.",
         )
     return columns

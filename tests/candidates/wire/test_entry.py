@@ -40,6 +40,9 @@ def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
     [
         ({"kind": "pickle"}, "kind", "server"),
         ({"name": "My Policy"}, "name", "pattern"),
+        ({"name": "my__policy"}, "name", "pattern"),
+        ({"name": "policy_"}, "name", "pattern"),
+        ({"name": "p" * 65}, "name", "64"),
         ({"author": "somebody"}, "author", "pattern"),
         ({"address": None}, "", "address or command"),
         ({"command": ["serve", "{port}"]}, "", "address or command"),
@@ -51,6 +54,10 @@ def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
         ({"weights": "x"}, "weights", "fields of a candidate of kind server"),
         ({"action": action(frame="tcp")}, "action", "frame robot_base"),
         ({"action": action(motion="relative")}, "action", "anchor"),
+        (
+            {"action": action(anchor={"position": ["p"], "rotation": ["r"]})},
+            "action", "absolute has no anchor",
+        ),
         ({"action": joints(frame="robot_base")}, "action", "stand alone"),
         ({"action": joints(rotation=action()["rotation"])}, "action", "stand alone"),
         ({"action": joints(joints=None)}, "action", "or joints say it"),

@@ -242,6 +242,24 @@ def test_an_anchor_that_is_no_pose_is_refused():
         )
 
 
+@pytest.mark.parametrize(
+    ("anchor", "told"),
+    [
+        ({"position": ["wrench_n"]}, r"position of .* wrench_n\.x in N, expected 3 numbers in m"),
+        ({"position": ["phase.insert", "hole_pose.x_m", "hole_pose.y_m"]}, r"phase\.insert in 1"),
+        ({"position": ["hole_pose.x_m", "hole_pose.y_m", "hole_pose.cos_yaw"]}, r"cos_yaw in 1"),
+        ({"rotation": ["wrench_n", "tcp_position_m"]}, r"rotation of .* in N, expected 6 numbers"),
+        ({"rotation": ["hole_pose", "tcp_rotation.column_0_x", "tcp_rotation.column_0_y"]}, "in m"),
+    ],
+)  # fmt: skip
+def test_an_anchor_of_another_unit_is_refused(task, anchor, told):
+    """Wrong before: displacements were added to three forces, and whatever came was judged."""
+    whole = {"position": ["tcp_position_m"], "rotation": ["tcp_rotation"]}
+    Outputs(output(motion="relative", anchor=whole), task.observation)
+    with pytest.raises(ContractError, match=told):
+        Outputs(output(motion="relative", anchor={**whole, **anchor}), task.observation)
+
+
 @pytest.mark.parametrize("form", ["rotation_6d", "quaternion_xyzw", "matrix"])
 @pytest.mark.parametrize("huge", [1e7, 1e200, -1e300])
 def test_a_row_with_a_number_that_would_overflow_is_none_at_all(form, huge):
