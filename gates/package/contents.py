@@ -24,6 +24,8 @@ from gates.preregistration import PREREGISTRATION
 from gates.report import GATES, stage_of
 from gates.settings import read_params, section_of
 from genpolicy.candidates.brought import BroughtPolicy, read_brought
+from genpolicy.candidates.hosts.translation import program_files
+from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.errors import ConfigError
 
 SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, OVERRIDES, "fixtures.yaml")
@@ -61,12 +63,18 @@ def brought(root: Path) -> list[BroughtPolicy]:
 
 
 def _of_policies(root: Path) -> Iterable[str]:
-    """Entries and the files that they name."""
+    """Entries, the files that they name, and those that a command of one names beside them.
+
+    An adapter is ours, and read from the checkout of whoever asks again.
+    """
     entries = section_of(read_params(root), "candidates")
     for policy in brought(root):
         where = f"{PARAMS}: candidates.{policy.name}"
         entry = PurePosixPath(str(entries[policy.name]))
-        for name in (entry, *(entry.parent / file for file in sorted(policy.entry.files))):
+        own = set(policy.entry.files)
+        if isinstance(policy.entry, ServerEntry):
+            own |= set(program_files(policy.entry, policy.folder))
+        for name in (entry, *(entry.parent / file for file in sorted(own))):
             _require_below(root, name.as_posix(), where)
             yield name.as_posix()
 

@@ -5,7 +5,10 @@ import re
 
 from genpolicy.errors import ConfigError
 
-ADDRESS = re.compile(r"ws://(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):(?P<port>\d{1,5})/?")
+LABEL = r"[A-Za-z0-9-]{1,63}"
+"""A part of a host's name: of an empty or a longer one the socket's library raises an error."""
+HOST = rf"\[[0-9A-Fa-f:.]+\]|{LABEL}(?:\.{LABEL})*\.?"
+ADDRESS = re.compile(rf"ws://(?P<host>{HOST}):(?P<port>\d{{1,5}})/?")
 LAST_PORT = 65535
 PLACE = "address of a policy's process"
 

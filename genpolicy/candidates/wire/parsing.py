@@ -28,6 +28,11 @@ def parse_entry(kind: type[Kind], values: Mapping[str, Any], *, where: str) -> K
     Raises:
         ConfigError: A field that is missing, unknown or wrong, or two that contradict each other.
     """
+    if _holds_zero(values):
+        raise ConfigError(
+            where=where, found="a text with a character of number 0",
+            expected="names of files and words that a machine takes", action=f"Remove it. {DOCS}",
+        )  # fmt: skip
     try:
         return parse_settings(kind, values, where=where)
     except ConfigError as error:
@@ -53,6 +58,15 @@ def parse_entry(kind: type[Kind], values: Mapping[str, Any], *, where: str) -> K
                 expected=f"what is consistent: {rule}", action=f"Correct the entry. {DOCS}",
             ) from error  # fmt: skip
         raise
+
+
+def _holds_zero(value: Any) -> bool:
+    """Whether a text anywhere in it could end a path or a word of a command too early."""
+    if isinstance(value, Mapping):
+        return any(_holds_zero(item) for pair in value.items() for item in pair)
+    if isinstance(value, list):
+        return any(map(_holds_zero, value))
+    return isinstance(value, str) and "\0" in value
 
 
 def _named(given: Any, rule: str) -> str:

@@ -22,8 +22,14 @@ def test_another_machine_needs_its_name():
 
 @pytest.mark.parametrize(
     "address", ["http://localhost:80", "wss://localhost:80", "ws://localhost", "ws://:80",
-                "ws://localhost:80/path", "ws://localhost:99999999", "localhost:80", ""],
+                "ws://localhost:80/path", "ws://localhost:99999999", "localhost:80", "", "ws://a..b:80",
+                "ws://.:80", "ws://" + "a" * 64 + ":80"],
 )  # fmt: skip
 def test_what_is_no_address_is_refused(address):
     with pytest.raises(ConfigError, match="expected ws://HOST:PORT"):
         check_address(address, None)
+
+
+def test_a_name_of_several_parts_is_one():
+    for host in ("robot-1.lab.example.org", "a" * 63, "robot."):
+        check_address(f"ws://{host}:80", host)

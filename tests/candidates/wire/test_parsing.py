@@ -45,3 +45,17 @@ def test_a_long_value_is_cut_and_no_dump_is_printed():
     with pytest.raises(ConfigError) as error:
         parse_entry(ServerEntry, {**ENTRY, "command": command}, where="one.yaml")
     assert "…" in error.value.found and len(error.value.found) < 120
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"files": {"weights\0": "0" * 64}},
+        {"address": None, "command": ["serve\0", "{port}"]},
+        {"constants": {"prompt": "\0"}},
+    ],
+)
+def test_a_text_that_ends_a_path_too_early_is_refused(changes):
+    """Wrong before: the machine's own `ValueError` ended whoever read the file or started it."""
+    with pytest.raises(ConfigError, match=r"one\.yaml is a text with a character of number 0"):
+        parse_entry(ServerEntry, {**ENTRY, **changes}, where="one.yaml")

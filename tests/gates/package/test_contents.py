@@ -81,6 +81,22 @@ def test_a_policy_that_was_brought_comes_with_its_entry_and_files(own):
     assert {"own/mine.yaml", "own/serve"} <= set(files_of_the_run(own))
 
 
+def test_what_its_command_names_comes_along(own):
+    """Wrong before: the script stayed behind, and an honest bundle was refused for its absence."""
+    command = ["python", "serve.py", "--port={port}", "--config=flow/config.json"]
+    said = {name: value for name, value in ENTRY.items() if name != "address"}
+    (own / "own/mine.yaml").write_text(yaml.safe_dump({**said, "command": command}))
+    (own / "own/serve.py").write_text("pass")
+    (own / "own/flow").mkdir()
+    (own / "own/flow/config.json").write_text("{}")
+    files = set(files_of_the_run(own))
+    assert {"own/mine.yaml", "own/serve", "own/serve.py", "own/flow/config.json"} <= files
+    (own / "own/serve.py").rename(own / "own/real.py")
+    (own / "own/serve.py").symlink_to("real.py")
+    with pytest.raises(ConfigError, match=r"own/serve\.py, which lies .* behind a link"):
+        files_of_the_run(own)
+
+
 @pytest.mark.parametrize("how", ["above", "absolute", "linked"])
 def test_a_policy_that_lies_elsewhere_cannot_be_carried(own, tmp_path, how):
     shutil.move(own / "own", tmp_path / "elsewhere")
