@@ -7,7 +7,8 @@ from safetensors import SafetensorError, safe_open
 
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ScriptedEntry
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
-from genpolicy.candidates.wire.entry import Entry
+from genpolicy.candidates.hosts.served_weights import require_served_weights
+from genpolicy.candidates.wire.entry import Entry, ServerEntry
 from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.integrity.documents import read_json
 
@@ -23,7 +24,7 @@ def require_forms(entry: Entry, folder: Path) -> None:
 
     Raises:
         ConfigError: A module without the function; documents or weights of LeRobot that are none,
-            or processors of it that could run code.
+            or processors of it that could run code; weights of a server that nothing pins.
     """
     if isinstance(entry, ScriptedEntry):
         _require_function(folder / entry.file, entry.function.partition(":")[2])
@@ -32,6 +33,8 @@ def require_forms(entry: Entry, folder: Path) -> None:
             read = _require_document if name.endswith(".json") else _require_weights
             read(folder / name)
         require_steps(entry, folder)
+    elif isinstance(entry, ServerEntry):
+        require_served_weights(entry, folder)
 
 
 def _require_function(path: Path, name: str) -> None:

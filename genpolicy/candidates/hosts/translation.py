@@ -7,6 +7,7 @@ from pathlib import Path
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
 from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
+from genpolicy.candidates.hosts.served_weights import require_served_weights
 from genpolicy.candidates.wire.channels import columns_of, widths_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
@@ -39,10 +40,12 @@ def as_server(
 
     Raises:
         ConfigError: Nothing on this machine runs it, or a checkpoint or policy of LeRobot takes or
-            gives something else than it says, or has processors that could run code.
+            gives something else than it says, or has processors that could run code, or weights of
+            a server are pinned by nothing.
         ContractError: It names what the observation does not have.
     """
     if isinstance(entry, ServerEntry):
+        require_served_weights(entry, path.resolve().parent)
         return entry
     entry.require_host()
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
