@@ -9,7 +9,7 @@ was taken when the six layers passed.
 import hashlib
 import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 _SEAL = object()
 PLAIN = frozenset({float, int, str, bool, type(None)})
 NAMES = frozenset({LayerOutcome, Reason, Unit})
+SMALL = PLAIN | NAMES
 
 
 @dataclass(frozen=True)
@@ -164,25 +165,28 @@ def _hash_of(whole: object) -> bytes:
     while open_parts:
         part = open_parts.pop()
         kind = type(part)
-        if kind in PLAIN:
-            found.append(repr(part).encode())
-        elif kind in NAMES:
-            found.append(b"=" + part.encode())
+        if kind in SMALL:
+            found.append(_text(part).encode())
         elif kind is np.ndarray:
             found.append(f"{part.dtype.str}{part.shape}".encode() + part.tobytes())
         elif kind is tuple or kind is list:
             found.append(f"{len(part)} of".encode())
             open_parts += part
-        elif kind is dict or isinstance(part, Mapping):
-            keys = sorted(part)
-            found.append(repr(keys).encode())
-            _put([part[key] for key in keys], found, open_parts)
-        elif is_dataclass(part):
+        elif hasattr(kind, "__dataclass_fields__"):
             found.append(kind.__name__.encode())
             _put(list(vars(part).values()), found, open_parts)
+        elif kind is dict or isinstance(part, Mapping):
+            keys = sorted(part)
+            found.append("|".join(map(str.__repr__, keys)).encode())
+            _put([part[key] for key in keys], found, open_parts)
         else:
             found.append(repr(part).encode())
     return hashlib.sha256(b"|".join(found)).digest()
+
+
+def _text(value: Any) -> str:
+    """A number or text as Python writes it; a name without quotes, so that no text is one."""
+    return "=" + value if type(value) in NAMES else repr(value)
 
 
 def _put(values: list[Any], found: list[bytes], open_parts: list[Any]) -> None:
@@ -190,8 +194,8 @@ def _put(values: list[Any], found: list[bytes], open_parts: list[Any]) -> None:
     kinds = set(map(type, values))
     if kinds == {float}:
         found.append(b"f8" + np.array(values).tobytes())
-    elif kinds <= PLAIN:
-        found.append(repr(values).encode())
+    elif kinds <= SMALL:
+        found.append("|".join(map(_text, values)).encode())
     else:
         found.append(f"{len(values)} in".encode())
         open_parts += values

@@ -46,13 +46,6 @@ class _State:
         rows = self.context.rows(len(self.projected.actions))
         return int(rows.stop) - int(rows.start)
 
-    @property
-    def computable(self) -> bool:
-        """The executable rows are numbers that kinematics and collision may be asked about."""
-        if not self.shaped:
-            return False
-        actions = self.projected.actions
-        return bool(np.all(np.isfinite(actions[self.context.rows(len(actions))])))
 
 
 class LayerChecker:
@@ -146,7 +139,7 @@ class LayerChecker:
         self._measure(FIRST, states, _batch(states))
         groups: dict[int, list[_State]] = defaultdict(list)
         for state in states:
-            if (state.alive or evaluate_all) and state.computable:
+            if (state.alive or evaluate_all) and state.shaped:
                 groups[state.row_count].append(state)
         for group in groups.values():
             self._motion(group, evaluate_all)
@@ -210,8 +203,16 @@ class LayerChecker:
         return found.q_rad[0], reached
 
     def _motion(self, states: list[_State], evaluate_all: bool) -> None:
-        """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows."""
-        batch = solved(_batch(states), self.cell)
+        """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows.
+
+        Kinematics and collision are asked about numbers only: a chunk with a row that is none is
+        asked nothing here.
+        """
+        batch = _batch(states)
+        finite = np.flatnonzero(np.isfinite(batch.actions).all(axis=(1, 2)))
+        if not len(finite):
+            return
+        states, batch = [states[i] for i in finite], solved(batch.take(finite), self.cell)
         usable = np.all(np.isfinite(batch.solved.q_rad), axis=(1, 2))
         for state, q_rad in zip(states, batch.solved.q_rad, strict=True):
             state.q_rad = q_rad
@@ -230,18 +231,15 @@ class LayerChecker:
                 break
             found = measure(batch.take(left), self.cell)
             asked = [states[i] for i in left]
-            for name in names:
-                for state, value in zip(asked, found.values[name].tolist(), strict=True):
-                    state.margins[name] = value
-            for i, detail in zip(left, found.details, strict=bool(found.details)):
-                states[i].detail = states[i].detail or detail
-            passed = np.all([found.values[name] >= 0 for name in names], axis=0)
-            left = left[passed]
-        for state in states:
-            state.alive = state.alive and self._passes(state, layer)
-
-    def _passes(self, state: _State, layer: str) -> bool:
-        return all(state.margins.get(name, np.nan) >= 0 for name in self._gauges[layer])
+            margins = np.array([found.values[name] for name in names])
+            for state, values in zip(asked, margins.T.tolist(), strict=True):
+                state.margins.update(zip(names, values, strict=True))
+            for state, detail in zip(asked, found.details, strict=bool(found.details)):
+                state.detail = state.detail or detail
+            left = left[np.all(margins >= 0, axis=0)]
+        passed = set(left.tolist())
+        for i, state in enumerate(states):
+            state.alive = state.alive and i in passed
 
     def _verdict(self, state: _State, evaluate_all: bool) -> Verdict:
         found, rejected = [], False

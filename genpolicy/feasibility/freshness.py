@@ -1,6 +1,8 @@
 """The freshness layer: is the chunk meant for this moment? It reads the table of checks."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.errors import NonFiniteError
@@ -28,12 +30,31 @@ def fresh(
         it yet), otherwise 0 where it holds and -1 where it does not. NaN, which passes nothing,
         where a time is no finite number.
     """
+    return fresh_many([metadata], [context], checks=checks)[0]
+
+
+def fresh_many(
+    chunks: Sequence[ChunkMetadata], contexts: Sequence[Context], *, checks: Checks = CHECKS
+) -> list[dict[str, float]]:
+    """`fresh` of many chunks; a context that several of them share is read once.
+
+    Args:
+        chunks: Metadata of each.
+        contexts: One per chunk.
+        checks: As of `fresh`.
+    """
     rows = at(checks, Place.LAYER)
-    try:
-        moment = _moment(metadata, context)
-    except NonFiniteError:
-        return {row.name: math.nan for row in rows}
-    return {row.name: _margin(row, moment) for row in rows}
+    unknown = {row.name: math.nan for row in rows}
+    moments = {key: _moment(c) for key, c in {id(c): c for c in contexts}.items()}
+    found = []
+    for metadata, context in zip(chunks, contexts, strict=True):
+        moment, times = moments[id(context)], _times(metadata)
+        if moment is None or times is None:
+            found.append(dict(unknown))
+            continue
+        asked = replace(moment, about=Chunk(metadata, times))
+        found.append({row.name: _margin(row, asked) for row in rows})
+    return found
 
 
 def _margin(check: Check, moment: Moment) -> float:
@@ -43,7 +64,23 @@ def _margin(check: Check, moment: Moment) -> float:
     return math.inf if margin_ns is None else margin_ns / NS_PER_S
 
 
-def _moment(metadata: ChunkMetadata, context: Context) -> Moment:
+def _times(metadata: ChunkMetadata) -> ChunkTimes | None:
+    """Times of a chunk; None where one is no number."""
+    try:
+        return ChunkTimes.of(metadata)
+    except NonFiniteError:
+        return None
+
+
+def _moment(context: Context) -> Moment | None:
+    """The moment of a context, about no chunk yet; None where one of its times is no number."""
+    try:
+        return _moment_of(context)
+    except NonFiniteError:
+        return None
+
+
+def _moment_of(context: Context) -> Moment:
     newest_s = context.newest_accepted_observation_s
     view = View(
         phase=context.phase,
@@ -57,6 +94,5 @@ def _moment(metadata: ChunkMetadata, context: Context) -> Moment:
     return Moment(
         now_ns=to_ns(context.now_s),
         view=view,
-        about=Chunk(metadata, ChunkTimes.of(metadata)),
         accepted_condition_ns=None if newest_s is None else to_ns(newest_s),
     )

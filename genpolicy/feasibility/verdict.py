@@ -100,7 +100,8 @@ class Verdict:
     @property
     def passed(self) -> bool:
         """Every layer was reached and passed."""
-        return len(self.layers) == len(LAYERS) and all(v.passed is True for v in self.layers)
+        passed = LayerOutcome.PASSED
+        return len(self.layers) == len(LAYERS) and all(v.outcome is passed for v in self.layers)
 
     @property
     def first(self) -> LayerVerdict | None:
