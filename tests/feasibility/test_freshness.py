@@ -9,7 +9,7 @@ import pytest
 from genpolicy.execution.checks import CHECKS, Place, at, without
 from genpolicy.feasibility.checks import CHECKS as TABLE
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.freshness import REASONS, fresh
+from genpolicy.feasibility.freshness import REASONS, fresh, fresh_many
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +64,13 @@ def test_a_row_has_one_name_and_one_reason_wherever_it_is_asked():
 def test_a_time_that_is_no_number_passes_nothing(kit, moment, field):
     margins = fresh(kit.metadata(), replace(moment, **{field: math.nan}))
     assert margins and not any(margin >= 0 for margin in margins.values())
+
+
+def test_many_are_asked_as_one_by_one_also_of_contexts_that_some_share(kit, moment):
+    late, lost = replace(moment, now_s=moment.now_s + 1.0), replace(moment, now_s=math.nan)
+    chunks = [kit.metadata(), kit.metadata(task_phase="insert"), kit.metadata(session_epoch=9)]
+    asked = [(chunk, context) for chunk in chunks for context in (moment, late, moment, lost)]
+    found = fresh_many(*map(list, zip(*asked, strict=True)))
+    for margins, (chunk, context) in zip(found, asked, strict=True):
+        assert margins == pytest.approx(fresh(chunk, context), abs=0.0, nan_ok=True)
+    assert len({str(margins) for margins in found}) == 7  # three chunks, now and late; no time
