@@ -131,7 +131,7 @@ class Ours:
         self.network, self.averaged = start.network, copy.deepcopy(start.network)
         self._course = training._optimise(
             self.network, self.averaged, start.objective,
-            data=start.data, followed=None, request=start.request, device="cpu",
+            data=start.data, followed=None, request=start.request, device="cpu", of=Path("ours"),
         )  # fmt: skip
 
     def __call__(self) -> None:

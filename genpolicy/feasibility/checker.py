@@ -47,7 +47,6 @@ class _State:
         return int(rows.stop) - int(rows.start)
 
 
-
 class LayerChecker:
     """Projects and checks chunks for one robot in one scene; holds no state between calls.
 
