@@ -177,7 +177,7 @@ def _drawn_again(
 
 def named(source: Source, goes_on: Made | None = None) -> Invocation:
     """What tells an invocation from another: its noise, what it saw and what it went on from."""
-    before = b"".join(one.commanded.tobytes() for one in (goes_on.said if goes_on else ()))
+    before = b"".join(one.left.tobytes() for one in (goes_on.said if goes_on else ()))
     return source.key, source.history.tobytes(), before
 
 

@@ -53,7 +53,7 @@ def prefixes_of(asked: Sequence[Made | None], rule: Rule) -> Prefix | None:
     free = np.zeros((rule.rows, ACTION_DIM)), np.zeros(rule.rows)
     given = [free if made is None else goes_on_from(made, rule.rows) for made in asked]
     actions, weights = (np.stack(parts) for parts in zip(*given, strict=True))
-    return Prefix(actions, weights, rule.joining.guidance)
+    return Prefix(actions, weights, rule.joining.guidance, rule.joining.starts_at)
 
 
 def hold_joined(

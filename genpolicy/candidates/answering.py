@@ -58,7 +58,7 @@ class AnsweringPolicy(NetworkPolicy):
                 condition[row : row + 1],
                 noise_names=noise_names[row : row + 1],
                 candidates=candidates,
-                prefix=prefix and _of_row(prefix, row),
+                prefix=prefix and prefix.of([row]),
             )
             for row in range(len(noise_names))
         ]
@@ -70,8 +70,3 @@ class AnsweringPolicy(NetworkPolicy):
         self.given_up += 1
         shape = (1, candidates, self.prediction_horizon, ACTION_DIM)
         return Samples(np.full(shape, np.nan), allowed_evaluations(self.sampler).most)
-
-
-def _of_row(prefix: Prefix, row: int) -> Prefix:
-    rows = slice(row, row + 1)
-    return Prefix(prefix.actions[rows], prefix.weights[rows], prefix.bound)

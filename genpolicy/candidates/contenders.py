@@ -49,11 +49,14 @@ def joining_of(rule: JoiningSettings, policy: Running) -> JoiningSettings:
     """How the chunks of a policy that is asked join; of one that did not start, as it is written.
 
     Raises:
-        ConfigError: `real_time` of one whose chunks cannot go on from given actions and that is not
-            named as exempt, or that can and is.
+        ConfigError: `real_time` or `warm_start` of one whose chunks cannot go on from given actions
+            and that is not named as exempt, or that can and is.
     """
-    if isinstance(policy, WirePolicy) and policy.absent:
-        return rule.named(policy.method)
+    if isinstance(policy, WirePolicy):
+        if policy.absent:
+            return rule.named(policy.method)
+        # No message says where sampling starts: who is asked over a wire starts from noise.
+        return rule.of(policy.method, guided=policy.guided and rule.starts_at is None)
     return rule.of(policy.method, guided=policy.guided)
 
 

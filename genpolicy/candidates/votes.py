@@ -263,6 +263,19 @@ def join(
     return propose(drawn, index)
 
 
+def rest_of_plan(votes: Sequence[Votes], *, rows: int) -> tuple[Array, Array]:
+    """What a new chunk starts from: actions (K, D_a) and their weights (K,), 1 or, of no plan, 0.
+
+    All commands of the previous plan from row 0 on, also those behind its execution horizon; then
+    its last one again. Arguments are those of `prefix`.
+    """
+    actions, weights = np.zeros((rows, ACTION_DIM)), np.zeros(rows)
+    if votes:
+        said = votes[-1].before.commanded[votes[-1].shift :]
+        actions[:], weights[:] = said[np.minimum(np.arange(rows), len(said) - 1)], 1.0
+    return actions, weights
+
+
 def prefix(votes: Sequence[Votes], *, rows: int, frozen: int) -> tuple[Array, Array]:
     """What a new chunk is drawn to go on from: actions (K, D_a) and their weights (K,).
 

@@ -124,6 +124,7 @@ def sample_diffusion(
     schedule: DiffusionSchedule,
     sampler: SamplerConfig,
     prediction: str = "noise",
+    skipped: int = 0,
 ) -> Tensor:
     """Clean chunks from a trained diffusion network.
 
@@ -134,6 +135,8 @@ def sample_diffusion(
         sampler: Name, steps (trailing spacing), `eta`, and `clip`: bound of the clean estimate
             at every step, from which the noise estimate is computed again.
         prediction: What the network predicts, a key of `PREDICTIONS`.
+        skipped: The first steps, of most noise, that are not taken: step 0 of the noise lies
+            behind them.
 
     Returns:
         Normalised chunks. Shape (B, K, D).
@@ -144,7 +147,7 @@ def sample_diffusion(
     if sampler.name not in UPDATES:
         refuse_name(sampler.name, DIFFUSION_SAMPLERS)
     update, kind = UPDATES[sampler.name], PREDICTIONS[prediction]
-    visited = trailing_levels(schedule.levels, sampler.steps)
+    visited = trailing_levels(schedule.levels, sampler.steps)[skipped:]
     kept = [float(schedule.alpha_bar[level]) for level in visited] + [1.0]
     x = noise(0)
     before: Tensor | None = None

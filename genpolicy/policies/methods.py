@@ -52,6 +52,7 @@ from genpolicy.policies.schedules import (
     trailing_levels,
 )
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
+from genpolicy.policies.warm_start import WarmStart, begun
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
 DERIVATIVE_FREE = "derivative_free"
@@ -274,7 +275,7 @@ def generate(
     head: HeadConfig,
     call_rows: Callable[[int], int],
     finish: Finish | None = None,
-    guidance: Guidance | None = None,
+    guidance: Guidance | WarmStart | None = None,
 ) -> tuple[Tensor, int]:
     """Normalised chunks of conditions, and the network evaluations that they took.
 
@@ -285,17 +286,19 @@ def generate(
         sampler, head: Settings, of the sampler and of the training.
         call_rows: Rows that a network call for so many rows has, padded.
         finish: The rest of an evaluation with the network's bits; None: the network's own.
-        guidance: What the chunks go on from; None: nothing.
+        guidance: What the chunks go on from, or start from; None: nothing.
 
     Returns:
         Chunks (B, K, D_a) and the counted NFE: calls, as many as the slowest row needed, and
         backward passes.
 
     Raises:
-        ConfigError: Guidance of a sampler that has no path to guide.
+        ConfigError: Guidance, or a warm start, of a sampler that has no path.
         EvaluationCapError: The sampler's cap was reached.
     """
+    noise, skipped = begun(noise, guidance, sampler=sampler, head=head)
     times, climbs = announced_times(sampler, head), sampler.name == LANGEVIN
+    times = times[skipped * (len(times) // sampler.steps) :]
     finish = network.climb if isinstance(network, EnergyNetwork) and climbs else finish
     ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows, finish=finish)
 
@@ -304,11 +307,13 @@ def generate(
 
     single = sampler.name in SINGLE_EVALUATION
     counted = CountedNetwork(once if single else ahead, cap=sampler.nfe_cap)
-    walked = guided(counted, sampler, head, guidance)
+    pulled = guidance if isinstance(guidance, Guidance) else None
+    walked = guided(counted, sampler, head, pulled)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
+        left = {"skipped": skipped} if skipped else {}  # a jump of the distilled has none
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
         schedule, said = squared_cosine(head.diffusion_levels), head.prediction
-        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=said)
+        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=said, **left)
     elif sampler.name in ENERGY_SAMPLERS:
         assert isinstance(network, EnergyNetwork)
         search = climb_codes if climbs else search_codes
@@ -319,7 +324,7 @@ def generate(
             counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
         )
     elif sampler.name in EQUAL_STEPS:
-        chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps)
+        chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps, skipped=skipped)
     else:
         drawn, rows = sampler.name in ("z_prior", "offset"), len(conditions.of_row)
         latent = noise(0) if drawn else conditions.stored.new_zeros(rows, head.latent_dim)

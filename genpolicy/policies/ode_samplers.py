@@ -96,14 +96,17 @@ CONSISTENCY = "consistency"
 EQUAL_STEPS = {**FIXED_TABLEAUS, CONSISTENCY: EULER}
 
 
-def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, steps: int) -> Tensor:
+def sample_ode(
+    velocity: NetworkFunction, noise: NoiseFunction, *, name: str, steps: int, skipped: int = 0
+) -> Tensor:
     """Clean chunks by equal steps.
 
     Args:
         velocity: Velocity of chunks at a flow time.
         noise: Noise function; only step 0, the start, is drawn.
         name: A key of `EQUAL_STEPS`.
-        steps: Equal steps.
+        steps: Equal steps from time 0 to 1.
+        skipped: The first of them that are not taken: step 0 of the noise lies behind them.
 
     Returns:
         Normalised chunks, not clipped. Shape (B, K, D).
@@ -117,7 +120,7 @@ def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, st
     tableau = EQUAL_STEPS[name]
     x = noise(0)
     h = 1.0 / steps
-    for times in equal_step_times(name, steps):
+    for times in equal_step_times(name, steps)[skipped:]:
         slopes: list[Tensor] = []
         for time, blend in zip(times, (None, *tableau.stages), strict=True):
             point = x if blend is None else x + h / blend.divisor * blend.sum(slopes)

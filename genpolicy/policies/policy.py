@@ -19,7 +19,7 @@ from genpolicy.policies.ahead import Conditions, padded
 from genpolicy.policies.call_shapes import call_shapes, compiled_calls
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.guidance import GUIDED, guidance_of
+from genpolicy.policies.guidance import GUIDED, Guidance, guidance_of
 from genpolicy.policies.methods import (
     STOCHASTIC_SAMPLERS,
     check_sampler,
@@ -29,7 +29,9 @@ from genpolicy.policies.methods import (
 )
 from genpolicy.policies.prefix import Prefix
 from genpolicy.policies.protocol import NoiseName, Samples, check_finite
+from genpolicy.policies.samplers import refuse_name
 from genpolicy.policies.settings import SamplerConfig
+from genpolicy.policies.warm_start import WarmStart, skipped_steps, warm_start_of
 from genpolicy.seeds import counter_noise
 
 Array = NDArray[np.float64]
@@ -90,7 +92,7 @@ class NetworkPolicy:
 
     @property
     def guided(self) -> bool:
-        """Whether its chunks can be drawn to go on from given actions."""
+        """Whether its chunks can be drawn to go on, or start, from given actions."""
         return self.sampler.name in GUIDED
 
     def sample(
@@ -113,7 +115,7 @@ class NetworkPolicy:
             Actions (B, N, K, D_a) in physical units, and the NFE of one sample (the most of any).
 
         Raises:
-            ConfigError: A prefix for a sampler that cannot be guided.
+            ConfigError: A prefix for a sampler that has no path from noise to a chunk.
             ContractError: Wrong shape, wrong number of names, no candidate.
             NonFiniteError: An observation is NaN or infinite; a chunk may be, see `Policy.sample`.
             EvaluationCapError: A sample took more network evaluations than its sampler may.
@@ -169,6 +171,32 @@ class NetworkPolicy:
         prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of conditions (B, C) from `encode`; see `sample`."""
+        if prefix is None or prefix.strength is None:
+            return self._drawn(condition, noise_names, candidates, prefix)
+        if not self.guided:
+            refuse_name(self.sampler.name, GUIDED)
+        # Rows with nothing to start from take every step: they are drawn by themselves.
+        starts = skipped_steps(prefix.strength, self.sampler.steps) > 0
+        known = [starts and bool(own.any()) for own in prefix.weights]
+        order, parts = list[int](), list[Samples]()
+        for warm in (False, True):
+            rows = [row for row, own in enumerate(known) if own == warm]
+            if rows:
+                names = [noise_names[row] for row in rows]
+                given = prefix.of(rows) if warm else None
+                parts.append(self._drawn(condition[rows], names, candidates, given))
+                order += rows
+        actions = np.concatenate([part.actions for part in parts])[np.argsort(order)]
+        return Samples(actions, max(part.nfe for part in parts))
+
+    def _drawn(
+        self,
+        condition: Tensor,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None,
+    ) -> Samples:
+        """As `sample_encoded`, of rows that all take the same steps."""
         names = [
             (self.checkpoint_hash, *row, candidate)
             for row in noise_names
@@ -176,7 +204,7 @@ class NetworkPolicy:
         ]
         chunks, evaluations = [], []
         # What is guided is differentiated, which nothing made in inference mode can be.
-        plain, normalise = prefix is None, self._normalisation.action.normalise
+        plain = prefix is None or prefix.strength is not None
         compiled = self._compiled if plain else None
         calls = compiled.shapes if compiled else self._calls
         with deterministic(self.device), torch.inference_mode(plain), torch.no_grad():
@@ -194,9 +222,7 @@ class NetworkPolicy:
                     head=self.checkpoint.config.head,
                     call_rows=self._calls.fit,
                     finish=compiled.finish(size) if compiled else None,
-                    guidance=guidance_of(prefix, rows, normalise, device=self.device)
-                    if prefix
-                    else None,
+                    guidance=self._goes_on(prefix, rows),
                 )
                 chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)
@@ -204,6 +230,15 @@ class NetworkPolicy:
         actions = self._normalisation.action.denormalise(normalised)
         shape = (len(noise_names), candidates, *actions.shape[1:])
         return Samples(actions.reshape(shape), max(evaluations))
+
+    def _goes_on(self, prefix: Prefix | None, rows: Sequence[int]) -> Guidance | WarmStart | None:
+        normalise = self._normalisation.action.normalise
+        if prefix is None:
+            return None
+        if prefix.strength is None:
+            return guidance_of(prefix, rows, normalise, device=self.device)
+        steps = self.sampler.steps
+        return warm_start_of(prefix, rows, normalise, steps=steps, device=self.device)
 
     def synchronise(self) -> None:
         """Wait until the device has finished what was asked of it."""

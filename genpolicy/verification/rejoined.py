@@ -21,8 +21,10 @@ from genpolicy.verification.pose import ACTION_DIM, ROTATION
 Array = NDArray[np.float64]
 
 OLDEST, RUNNING = "ensemble_oldest", "running_average"
-NEAREST, GUIDED = "bidirectional", "real_time"
-ONE_PLAN = (NEAREST, GUIDED)
+NEAREST, GUIDED, STARTED = "bidirectional", "real_time", "warm_start"
+DRAWN_ON = (GUIDED, STARTED)
+"""Rules by which a sample was drawn with the plan before in hand."""
+ONE_PLAN = (NEAREST, *DRAWN_ON)
 """Rules that look at the newest earlier plan alone, the same for every candidate."""
 TURN_M = 0.1
 """What a unit of a column of a rotation counts as, m, where distances are compared."""
@@ -39,6 +41,7 @@ class Said:
         stop: Row behind the last one.
         shift: Its own row is that of the new chunk plus this.
         commanded: Its admitted actions for these rows. Shape (stop - first, 10).
+        left: All its admitted actions from the first of these rows on. Shape (>= 1, 10).
     """
 
     invocation: str
@@ -47,6 +50,7 @@ class Said:
     stop: int
     shift: int
     commanded: Array
+    left: Array
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,8 @@ class Made:
 
     @property
     def guided(self) -> bool:
-        """Whether it was drawn to go on from an earlier plan."""
-        return self.rule == GUIDED and bool(self.said)
+        """Whether it was drawn to go on, or start, from an earlier plan."""
+        return self.rule in DRAWN_ON and bool(self.said)
 
     @property
     def blended(self) -> bool:
@@ -130,7 +134,7 @@ class Rejoined:
         when = own["t"], entered
         if own["rule"] == NEAREST:
             when = self._at_first.get(name, (0, 0))
-        elif own["rule"] == GUIDED:
+        elif own["rule"] in DRAWN_ON:
             when = chunk["start_ns"], before
         due = self._due(chunk, *when, newest=own["rule"] in ONE_PLAN)
         if own["parents"] != due:
@@ -157,7 +161,8 @@ class Rejoined:
             rows = actions[first + shift : stop + shift]
             if rest or first + shift < 0 or len(rows) != stop - first:
                 raise ValueError(f"rows {first} to {stop} of {own['invocation']!r} by {parent!r}")
-            said.append(Said(parent, made["draw"], first, stop, shift, rows))
+            left = actions[first + shift :]
+            said.append(Said(parent, made["draw"], first, stop, shift, rows, left))
         order = {made["invocation"]: place for place, (_, made) in enumerate(self._entered)}
         said.sort(key=lambda one: order[one.invocation])
         return Made(
@@ -270,9 +275,15 @@ def goes_on_from(made: Made, rows: int) -> tuple[Array, Array]:
     """What a chunk was drawn to go on from: actions (rows, 10), and weights (rows,).
 
     A row weighs 1 while the plan before is executed for sure, then c (e^c - 1) / (e - 1), where c
-    falls evenly from 1 to 0 over the rest of what it says.
+    falls evenly from 1 to 0 over the rest of what it says. A chunk that started from it started
+    from every row that is left of it, and from its last one where none is; each weighs 1.
     """
     actions, weights = np.zeros((rows, ACTION_DIM)), np.zeros(rows)
+    if made.rule == STARTED:
+        for plan in made.said:
+            behind = np.repeat(plan.left[-1:], rows, axis=0)
+            actions, weights = np.concatenate([plan.left, behind])[:rows], np.ones(rows)
+        return actions, weights
     for plan in made.said:
         fixed = min(made.lead, plan.stop)
         for row in range(plan.first, plan.stop):

@@ -15,6 +15,7 @@ from genpolicy.candidates.votes import (
     blend,
     nearest_first,
     prefix,
+    rest_of_plan,
 )
 from genpolicy.contract.action import join_action, split_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata
@@ -188,13 +189,18 @@ def test_the_prefix_is_frozen_where_it_will_be_executed_and_fades_behind():
 
 
 def test_a_hash_of_the_sampler_tells_rules_apart_and_replacing_changes_none():
-    rules = ("ensemble_oldest", "ensemble_newest", "running_average", "bidirectional", "real_time")
+    rules = (
+        "ensemble_oldest", "ensemble_newest", "running_average", "bidirectional", "real_time",
+        "warm_start",
+    )  # fmt: skip
     found = {JoiningSettings(rule=rule).sampler_hash("own") for rule in rules}
-    assert JoiningSettings().sampler_hash("own") == "own" and len(found | {"own"}) == 6
+    assert JoiningSettings().sampler_hash("own") == "own" and len(found | {"own"}) == 7
     sharper = JoiningSettings(rule="ensemble_oldest", decay=0.5).sampler_hash("own")
     assert sharper not in found
     quicker = JoiningSettings(rule="running_average", newest=0.5).sampler_hash("own")
     assert quicker not in found
+    warmer = JoiningSettings(rule="warm_start", strength=0.25).sampler_hash("own")
+    assert warmer not in found
     # What a rule does not read is not in its identity.
     assert JoiningSettings(rule="real_time", decay=0.5).sampler_hash("own") in found
 
@@ -215,8 +221,31 @@ def test_a_method_without_a_path_is_named_or_refused():
     )
 
 
+def test_a_method_without_a_path_to_start_on_is_named_or_refused():
+    joining = JoiningSettings(rule="warm_start", exempt=["chunked_bc"])
+    assert joining.of("chunked_bc", guided=False).rule == "replace"
+    assert joining.of("flow", guided=True).starts_at == 0.5
+    assert JoiningSettings(rule="real_time").starts_at is None
+    with pytest.raises(ConfigError, match=r"act has no path|and act is .*no path.*to start on"):
+        joining.of("act", guided=False)
+    with pytest.raises(ConfigError, match=r"can be started on, named.*`warm_start`"):
+        joining.of("chunked_bc", guided=True)
+
+
+def test_a_start_is_all_that_is_left_of_the_newest_plan_and_then_its_last_row():
+    older, newer = prediction(0, start=0, x_m=-1.0), prediction(1, start=1)
+    newer.commanded[:, 0] = np.arange(ROWS)
+    votes = [Votes(older, 0, 2, 6), Votes(newer, 0, 3, 5)]
+    actions, weights = rest_of_plan(votes, rows=ROWS)
+    assert actions[:, 0].tolist() == [*range(5, ROWS), *[ROWS - 1.0] * 5]
+    assert (weights == 1.0).all()
+    actions, weights = rest_of_plan([], rows=ROWS)
+    assert not actions.any() and not weights.any()
+
+
 def test_the_rule_is_said_with_what_it_reads():
     assert JoiningSettings().said() == "first_admissible"
     assert JoiningSettings(rule="real_time").said() == (
         "first_admissible; joined by real_time, guidance 5"
     )
+    assert JoiningSettings(rule="warm_start").said().endswith("warm_start, strength 0.5")

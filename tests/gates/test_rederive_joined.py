@@ -16,7 +16,7 @@ from gates.rederive import _held_to
 from gates.rederive_draws import rederive_rollout_draws
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.selector import propose
-from genpolicy.candidates.votes import join, prefix
+from genpolicy.candidates.votes import join, prefix, rest_of_plan
 from genpolicy.errors import RefusedError
 from genpolicy.evidence.stress import joined as product
 from genpolicy.execution.journal import read_journal
@@ -27,6 +27,7 @@ NEWEST = JoiningSettings(rule="ensemble_newest", decay=1.0)
 RUNNING = JoiningSettings(rule="running_average", newest=0.6)
 NEAREST = JoiningSettings(rule="bidirectional", decay=0.3)
 GUIDED = JoiningSettings(rule="real_time")
+WARM = JoiningSettings(rule="warm_start", strength=0.5)
 LEAD = 6
 """Rows by which a plan lasts while the next one is made: several earlier ones speak for a row."""
 
@@ -79,13 +80,13 @@ def made(path):
 
 
 @pytest.mark.parametrize(
-    "joining", [OLDEST, NEWEST, RUNNING, NEAREST, GUIDED], ids=lambda own: own.rule
+    "joining", [OLDEST, NEWEST, RUNNING, NEAREST, GUIDED, WARM], ids=lambda own: own.rule
 )
 def test_what_was_joined_as_it_says_stands(root, rolled, joining):
     path = rolled(joining)
     assert not seen_by_the_checker(path, joining, motion=True)
     parents = [len(payload["parents"]) for payload in made(path)]
-    assert max(parents) == (1 if joining in (NEAREST, GUIDED) else 2), "nothing was joined"
+    assert max(parents) == (1 if joining in (NEAREST, GUIDED, WARM) else 2), "nothing was joined"
     rederive_rollout_draws(root, params_of(joining), [path])
 
 
@@ -149,6 +150,7 @@ def later(self, votes):
 
 @pytest.mark.parametrize(("joining", "forged"), [
     (OLDEST, nobody), (NEWEST, nobody), (NEAREST, nobody), (GUIDED, nobody),
+    (WARM, nobody),
     (OLDEST, without_the_oldest), (NEWEST, shorter), (NEAREST, shorter), (GUIDED, shorter),
     (RUNNING, shorter), (RUNNING, without_the_oldest),
     (OLDEST, later), (NEAREST, later),
@@ -188,3 +190,40 @@ def test_what_was_drawn_to_go_on_from_something_else_is_refused(root, rolled, mo
     assert not seen_by_the_checker(path, GUIDED)
     with pytest.raises(RefusedError, match=r"candidate \d is (up to .* beside it|drawn as \w+)"):
         rederive_rollout_draws(root, params_of(GUIDED), [path])
+
+
+def cold(votes, *, rows):
+    actions, weights = rest_of_plan(votes, rows=rows)
+    return actions, np.zeros_like(weights)
+
+
+def beside(votes, *, rows):
+    actions, weights = rest_of_plan(votes, rows=rows)
+    actions[:, 1] += 0.002
+    return actions, weights
+
+
+def only_what_may_be_executed(votes, *, rows):
+    actions, weights = rest_of_plan(votes, rows=rows)
+    if votes:
+        actions[votes[-1].stop :] = actions[votes[-1].stop - 1]
+    return actions, weights
+
+
+@pytest.mark.parametrize("forged", [cold, beside, only_what_may_be_executed])
+def test_what_started_from_something_else_is_refused(root, rolled, monkeypatch, forged):
+    monkeypatch.setattr(product, "rest_of_plan", forged)
+    path = rolled(WARM)
+    assert not seen_by_the_checker(path, WARM)
+    with pytest.raises(RefusedError, match=r"candidate \d is (up to .* beside it|drawn as \w+)"):
+        rederive_rollout_draws(root, params_of(WARM), [path])
+
+
+def test_another_strength_than_the_stated_one_is_refused(root, rolled, monkeypatch):
+    """The sampler took three steps of four, and its chunks bear the name of two."""
+    monkeypatch.setattr(JoiningSettings, "starts_at", 0.75)
+    path = rolled(WARM)
+    monkeypatch.undo()
+    monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
+    with pytest.raises(RefusedError, match=r"candidate \d is (up to .* beside it|drawn as \w+)"):
+        rederive_rollout_draws(root, params_of(WARM), [path])

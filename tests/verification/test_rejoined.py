@@ -38,7 +38,8 @@ def made_of(rule, *said, turn=0, draw=0, lead=3):
 
 
 def said_by(name, first, stop, shift, sample):
-    return Said(name, 0, first, stop, shift, sample[first + shift : stop + shift])
+    return Said(name, 0, first, stop, shift, sample[first + shift : stop + shift],
+                sample[first + shift :])  # fmt: skip
 
 
 def test_the_weights_of_a_mean_by_hand():
@@ -130,13 +131,23 @@ def test_the_weights_of_a_prefix_by_hand():
     assert not actions.any() and not weights.any()
 
 
+def test_what_was_started_from_is_all_that_is_left_and_then_its_last_row():
+    (plan,) = samples(1)
+    actions, weights = goes_on_from(made_of("warm_start", said_by("a", 0, 3, 5, plan)), ROWS)
+    np.testing.assert_array_equal(actions[:11], plan[5:])
+    np.testing.assert_array_equal(actions[11:], np.repeat(plan[-1:], 5, axis=0))
+    assert (weights == 1.0).all()
+    actions, weights = goes_on_from(made_of("warm_start"), ROWS)
+    assert not actions.any() and not weights.any()
+
+
 def test_a_turn_counts_by_an_arm_of_a_tenth_of_a_metre_and_no_number_is_furthest():
     (plan,) = samples(1)
     drawn = np.stack([plan, plan, plan, plan])
     drawn[1, 2, 0] += 0.3
     drawn[2, 3, 4] += 0.3
     drawn[3, 2, 0] = math.nan
-    said = Said("a", 0, 2, 4, 0, plan[2:4])
+    said = Said("a", 0, 2, 4, 0, plan[2:4], plan[2:])
     ways_m = ways_to_plan(made_of("bidirectional", said), drawn, 2.0)
     np.testing.assert_allclose(ways_m, [0.0, 0.3, 0.03 * math.exp(-1.0), math.inf])
 
@@ -263,6 +274,7 @@ def test_what_is_stated_is_read_in_the_order_in_which_it_entered(session):
         ("a", 1, 2, 6), ("b", 1, 6, 2),
     ]  # fmt: skip
     assert made.blended and not made.guided and not made.chosen
+    assert replace(made, rule="warm_start").guided
     assert replace(made, rule="real_time").guided and replace(made, rule="bidirectional").chosen
 
 

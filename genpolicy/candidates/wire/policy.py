@@ -208,7 +208,8 @@ class WirePolicy:
         if prefix is None or self.absent:
             return None
         assert isinstance(self._remote, RemotePolicy)  # it is not absent
-        if why := self._remote.unguided:
+        no_start = "" if prefix.strength is None else "a message that says nothing to start from"
+        if why := no_start or self._remote.unguided:
             raise ConfigError(
                 where=f"a prefix for {self.method}",
                 found=why,

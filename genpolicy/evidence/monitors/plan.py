@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from genpolicy.candidates.contenders import Contender
-from genpolicy.candidates.joining import REAL_TIME, JoiningSettings
+from genpolicy.candidates.joining import DRAWN_ON, JoiningSettings
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.evidence.monitors.settings import (
     JUDGED,
@@ -73,10 +73,10 @@ def require_runnable(
     """
     if not settings.on:
         return
-    if joining.rule == REAL_TIME:
+    if joining.rule in DRAWN_ON:
         raise ConfigError(
             where=WHERE,
-            found=f"probes, and stress.joining: {REAL_TIME}",
+            found=f"probes, and stress.joining: {joining.rule}",
             expected="a rule under which what an invocation draws hangs on what it sees alone",
             action="Leave out the probes (`monitors: {}`), or choose another rule.",
         )

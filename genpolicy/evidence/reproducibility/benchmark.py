@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.answering import AnsweringPolicy
 from genpolicy.candidates.contenders import Running, joining_of
-from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
+from genpolicy.candidates.joining import DRAWN_ON, REPLACE, JoiningSettings
 from genpolicy.candidates.planned import PlannerPolicy
-from genpolicy.candidates.votes import Prediction, Votes, join, prefix
+from genpolicy.candidates.votes import Prediction, Votes, join, prefix, rest_of_plan
 from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
@@ -293,10 +293,14 @@ def _plan_before(metadata: ChunkMetadata, rows: int, reach: int) -> Votes:
 
 
 def _guided(policy: Policy, votes: list[Votes], joining: JoiningSettings) -> Prefix | None:
-    if joining.rule != REAL_TIME:
+    if joining.rule not in DRAWN_ON:
         return None
-    actions, weights = prefix(votes, rows=policy.prediction_horizon, frozen=1)
-    return Prefix(actions[None], weights[None], joining.guidance)
+    rows = policy.prediction_horizon
+    if joining.starts_at is not None:
+        actions, weights = rest_of_plan(votes, rows=rows)
+    else:
+        actions, weights = prefix(votes, rows=rows, frozen=1)
+    return Prefix(actions[None], weights[None], joining.guidance, joining.starts_at)
 
 
 def _evict_caches(fill: int) -> None:

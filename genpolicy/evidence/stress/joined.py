@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from genpolicy.candidates.joining import BIDIRECTIONAL, BLENDS, REAL_TIME, REPLACE
+from genpolicy.candidates.joining import BIDIRECTIONAL, BLENDS, DRAWN_ON, REPLACE
 from genpolicy.candidates.votes import (
     VOTE_CHECKS,
     Now,
@@ -12,6 +12,7 @@ from genpolicy.candidates.votes import (
     Votes,
     join,
     prefix,
+    rest_of_plan,
 )
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.evidence.stress.state import InFlight, Setup
@@ -41,15 +42,16 @@ class Joined:
         self._past = Past(checks)
 
     def begin(self, flying: InFlight) -> None:
-        """What an invocation that begins now is to go on from; only `real_time` says it before."""
-        if self._joining.rule != REAL_TIME:
+        """What an invocation that begins now is to go on from; only `DRAWN_ON` say it before."""
+        if self._joining.rule not in DRAWN_ON:
             return
         flying.votes = self._votes(flying.metadata, first=0)[-1:]
-        flying.prefix = prefix(
-            flying.votes,
-            rows=self._setup.horizons.prediction_horizon,
-            frozen=self._setup.execution.replan_lead_rows,
-        )
+        rows = self._setup.horizons.prediction_horizon
+        if self._joining.starts_at is not None:
+            flying.prefix = rest_of_plan(flying.votes, rows=rows)
+        else:
+            frozen = self._setup.execution.replan_lead_rows
+            flying.prefix = prefix(flying.votes, rows=rows, frozen=frozen)
 
     def propose(self, flying: InFlight, drawn: list[Candidate], *, late_rows: int) -> Proposal:
         """What is proposed of an answer, when its turn is `flying.candidate`."""

@@ -178,7 +178,8 @@ def _prefix(asking: Sequence[Rollout]) -> Prefix | None:
     if not given:
         return None
     actions, weights = (np.stack(parts) for parts in zip(*given, strict=True))
-    return Prefix(actions, weights, asking[0].setup.joining.guidance)
+    joining = asking[0].setup.joining
+    return Prefix(actions, weights, joining.guidance, joining.starts_at)
 
 
 def _judge_deliveries(active: Sequence[Rollout]) -> None:

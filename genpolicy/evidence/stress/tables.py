@@ -8,7 +8,7 @@ import numpy as np
 
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import Contender
-from genpolicy.candidates.joining import REAL_TIME
+from genpolicy.candidates.joining import DRAWN_ON
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
@@ -213,7 +213,7 @@ def plan_shards(
             expected=f"at most execution.human_timeout_s, {waits_s:g} s",
             action="Let recovery wait for longer, or have the person come sooner.",
         )
-    for policy in judged if comparison.joining.rule == REAL_TIME else ():
+    for policy in judged if comparison.joining.rule in DRAWN_ON else ():
         if isinstance(policy, JudgedPolicy):  # a server says it when it is asked
             comparison.joining.of(policy.name, guided=policy.load().guided)
     return [

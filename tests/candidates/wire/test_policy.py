@@ -1,6 +1,7 @@
 """A policy behind the wire in the place of ours: its faults are chunks that are none."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -235,6 +236,19 @@ def test_the_rule_that_draws_on_is_of_who_takes_a_prefix(wire):
         joining_of(real_time, wire(Planted()))
     exempt = JoiningSettings(rule="real_time", exempt=["planted"])
     assert joining_of(exempt, wire(Planted())).rule == "replace"
+
+
+def test_nobody_over_a_wire_is_told_where_to_start(wire, task):
+    warm = JoiningSettings(rule="warm_start")
+    with pytest.raises(ConfigError, match=r"planted.*no path from noise to start on"):
+        joining_of(warm, wire(Planted(prefix=True)))
+    exempt = warm.model_copy(update={"exempt": ["planted"]})
+    assert joining_of(exempt, wire(Planted(prefix=True))).rule == "replace"
+    prefix = replace(given(1.0), strength=0.5)
+    with pytest.raises(ConfigError, match=r"prefix for planted.*nothing to start from"):
+        wire(Planted(prefix=True)).sample(
+            seen(1, task), noise_names=[("a",)], candidates=1, prefix=prefix
+        )
 
 
 def test_what_nothing_is_given_to_is_asked_plainly(wire, task):

@@ -49,8 +49,9 @@ def test_hashes_are_of_every_planned_rollout(task, bench):
     assert found != start_hashes(task, bench.settings, root_seed=6)
 
 
-def test_a_rule_under_which_nothing_can_be_drawn_again_is_refused(task, bench):
-    rule = JoiningSettings(rule="real_time")
+@pytest.mark.parametrize("name", ["real_time", "warm_start"])
+def test_a_rule_under_which_nothing_can_be_drawn_again_is_refused(task, bench, name):
+    rule = JoiningSettings(rule=name)
     with pytest.raises(ConfigError, match=r"monitors is probes.*on what it sees alone"):
         require_runnable(bench.settings, rule, task, root_seed=5)
     require_runnable(bench.settings, JoiningSettings(), task, root_seed=5)

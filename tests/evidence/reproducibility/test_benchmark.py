@@ -68,7 +68,8 @@ def test_a_chunk_is_judged_where_it_was_drawn_for(fleet, observations):
     ("method", "rule"),
     [
         *((method, rule) for rule in ("ensemble_oldest", "bidirectional") for method in METHODS),
-        ("flow", "real_time"),  # the other cannot be guided: refused where the setting is read
+        ("flow", "real_time"),
+        ("flow", "warm_start"),  # the other cannot be guided: refused where the setting is read
     ],
 )
 def test_what_is_timed_is_joined_as_it_is_deployed(fleet, observations, monkeypatch, method, rule):
@@ -87,9 +88,11 @@ def test_what_is_timed_is_joined_as_it_is_deployed(fleet, observations, monkeypa
         joining=JoiningSettings(rule=rule),
     )  # fmt: skip
     assert len(given) == len(proposed) == 2  # no sample beside those that are timed
-    assert all((one is not None) == (rule == "real_time") for one in given)
+    assert all((one is not None) == (rule in {"real_time", "warm_start"}) for one in given)
     if rule == "real_time":
         assert all((one.weights > 0).sum() == 7 for one in given)
+    if rule == "warm_start":
+        assert all((one.weights == 1).all() and one.strength == 0.5 for one in given)
     blends = rule == "ensemble_oldest" and method == "flow"
     assert all((one.selected_by == rule) == blends or method == "bc" for one in proposed)
 

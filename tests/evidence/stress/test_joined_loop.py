@@ -39,6 +39,7 @@ LATENCY = LatencyModel(
         "running_average",
         "bidirectional",
         "real_time",
+        "warm_start",
     ],
 )
 def rule(request):
