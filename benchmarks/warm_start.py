@@ -13,6 +13,7 @@ import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,7 @@ def switched(policy: Spied, task: Task) -> tuple[int, int]:
     changes, pairs = 0, 0
     for invocations in policy.seen.values():
         modes = [task.mode_of(chunk[:, :3], seen) for seen, chunk in invocations]
-        for before, after in zip(modes, modes[1:], strict=False):
+        for before, after in pairwise(modes):
             if "unassigned" not in {before, after}:
                 pairs, changes = pairs + 1, changes + (before != after)
     return changes, pairs
