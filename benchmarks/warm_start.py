@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.answering import AnsweringPolicy
-from genpolicy.candidates.joining import WARM_START, JoiningSettings
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, trained
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
@@ -144,7 +144,7 @@ def switched(policy: Spied, task: Task) -> tuple[int, int]:
 def row_of(judged: JudgedPolicy, strength: float, given: argparse.Namespace) -> list[str]:
     """The figures of one method at one strength, in the order of `COLUMNS`."""
     task = load_task(PARAMS["task"]["name"])
-    joining = JoiningSettings(rule=WARM_START, strength=strength)
+    joining = JoiningSettings(rule="warm_start", strength=strength)
     policy = Spied(judged.load())
     rollouts = closed_loop(
         policy, setup_of(judged, task, joining), starts=given.starts, ticks=given.ticks

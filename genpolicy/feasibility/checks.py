@@ -13,7 +13,7 @@ from genpolicy.errors import ConfigError
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.freshness import fresh_many
+from genpolicy.feasibility.freshness import fresh
 from genpolicy.feasibility.layers import contact, dynamic, geometric, kinematic, representation
 from genpolicy.feasibility.reasons import Reason, Unit
 from genpolicy.feasibility.settings import LAYERS
@@ -27,7 +27,7 @@ CLOSE_M = 0.1  # a distance that counts as one whole limit where the limit itsel
 
 def fresh_margins(batch: Batch, cell: Cell) -> Margins:
     """Margins of the fresh layer: 0 or -1 for what must be equal, s for what is a time."""
-    found = fresh_many([projected.metadata for projected in batch.projected], batch.contexts)
+    found = fresh([projected.metadata for projected in batch.projected], batch.contexts)
     return Margins({name: np.array([m[name] for m in found]) for name in found[0]} if found else {})
 
 

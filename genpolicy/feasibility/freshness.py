@@ -16,32 +16,21 @@ REASONS = {check.name: check.reason for check in at(CHECKS, Place.LAYER) if chec
 
 
 def fresh(
-    metadata: ChunkMetadata, context: Context, *, checks: Checks = CHECKS
-) -> dict[str, float]:
-    """Session, calibration, phase, weights, sampler, and time, by name of the check.
-
-    Args:
-        metadata: Of the chunk.
-        context: The moment of the check.
-        checks: The table; its rows of the place `LAYER` are asked.
-
-    Returns:
-        A margin each, s: limit minus value for a question of time (infinite where nothing limits
-        it yet), otherwise 0 where it holds and -1 where it does not. NaN, which passes nothing,
-        where a time is no finite number.
-    """
-    return fresh_many([metadata], [context], checks=checks)[0]
-
-
-def fresh_many(
     chunks: Sequence[ChunkMetadata], contexts: Sequence[Context], *, checks: Checks = CHECKS
 ) -> list[dict[str, float]]:
-    """`fresh` of many chunks; a context that several of them share is read once.
+    """Session, calibration, phase, weights, sampler, and time, by name of the check.
+
+    A context that several chunks share is read once.
 
     Args:
         chunks: Metadata of each.
-        contexts: One per chunk.
-        checks: As of `fresh`.
+        contexts: The moment of the check, one per chunk.
+        checks: The table; its rows of the place `LAYER` are asked.
+
+    Returns:
+        Of each chunk a margin each, s: limit minus value for a question of time (infinite where
+        nothing limits it yet), otherwise 0 where it holds and -1 where it does not. NaN, which
+        passes nothing, where a time is no finite number.
     """
     rows = at(checks, Place.LAYER)
     unknown = {row.name: math.nan for row in rows}

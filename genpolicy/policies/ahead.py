@@ -39,6 +39,10 @@ class Conditions:
         """The condition of every row. Shape (B, C)."""
         return self.stored[self.of_row]
 
+    def zeros(self, size: int) -> Tensor:
+        """So many zeros for every row. Shape (B, size)."""
+        return self.stored.new_zeros(len(self.of_row), size)
+
     def spread(self, values: Tensor) -> Tensor:
         """Of values (U, ...) the one of each row: one for all rows where all have the same."""
         return values if len(self.stored) == 1 else values[self.of_row]

@@ -54,12 +54,12 @@ from genpolicy.policies.schedules import (
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 from genpolicy.policies.warm_start import WarmStart, begun
 
-SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
+DRAWN = ("z_prior", "offset")
+SINGLE_EVALUATION = ("direct", "z_zero", *DRAWN)
 DERIVATIVE_FREE = "derivative_free"
 ENERGY_SAMPLERS = (DERIVATIVE_FREE, LANGEVIN)
 STOCHASTIC_SAMPLERS = (
-    "z_prior", "offset", CONSISTENCY, MULTISTEP,
-    *ENERGY_SAMPLERS, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
+    *DRAWN, CONSISTENCY, MULTISTEP, *ENERGY_SAMPLERS, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
 )  # fmt: skip
 
 
@@ -245,11 +245,11 @@ def _check_cap(method: Method, sampler: SamplerConfig) -> None:
         )
 
 
-def announced_times(sampler: SamplerConfig, head: HeadConfig) -> list[float]:
+def announced_times(sampler: SamplerConfig, head: HeadConfig, skipped: int = 0) -> list[float]:
     """Times at which a sampler evaluates its network, as float32 holds them, where it knows them.
 
     An energy has one score whatever the time; an adaptive solver finds its times on the way, and
-    one pass has none.
+    one pass has none. A warm start skips some steps, and theirs.
     """
     if sampler.name in ENERGY_SAMPLERS:
         return [0.0]
@@ -263,7 +263,7 @@ def announced_times(sampler: SamplerConfig, head: HeadConfig) -> list[float]:
     elif sampler.name in EQUAL_STEPS:
         times = torch.tensor(equal_step_times(sampler.name, sampler.steps)).flatten()
     found: list[float] = times.tolist()
-    return found
+    return found[skipped * (len(found) // sampler.steps) :]
 
 
 def generate(
@@ -289,26 +289,23 @@ def generate(
         guidance: What the chunks go on from, or start from; None: nothing.
 
     Returns:
-        Chunks (B, K, D_a) and the counted NFE: calls, as many as the slowest row needed, and
-        backward passes.
+        Chunks (B, K, D_a) and the counted NFE: calls of the slowest row, and backward passes.
 
     Raises:
         ConfigError: Guidance, or a warm start, of a sampler that has no path.
         EvaluationCapError: The sampler's cap was reached.
     """
     noise, skipped = begun(noise, guidance, sampler=sampler, head=head)
-    times, climbs = announced_times(sampler, head), sampler.name == LANGEVIN
-    times = times[skipped * (len(times) // sampler.steps) :]
+    times, climbs = announced_times(sampler, head, skipped), sampler.name == LANGEVIN
     finish = network.climb if isinstance(network, EnergyNetwork) and climbs else finish
     ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows, finish=finish)
 
     def once(values: Tensor, _: Tensor) -> Tensor:
         return network.evaluate(conditions.rows, *(() if sampler.name == "direct" else (values,)))
 
-    single = sampler.name in SINGLE_EVALUATION
-    counted = CountedNetwork(once if single else ahead, cap=sampler.nfe_cap)
-    pulled = guidance if isinstance(guidance, Guidance) else None
-    walked = guided(counted, sampler, head, pulled)
+    asked = once if sampler.name in SINGLE_EVALUATION else ahead
+    counted = CountedNetwork(asked, cap=sampler.nfe_cap)
+    walked = guided(counted, sampler, head, guidance if isinstance(guidance, Guidance) else None)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         left = {"skipped": skipped} if skipped else {}  # a jump of the distilled has none
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
@@ -326,8 +323,7 @@ def generate(
     elif sampler.name in EQUAL_STEPS:
         chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps, skipped=skipped)
     else:
-        drawn, rows = sampler.name in ("z_prior", "offset"), len(conditions.of_row)
-        latent = noise(0) if drawn else conditions.stored.new_zeros(rows, head.latent_dim)
+        latent = noise(0) if sampler.name in DRAWN else conditions.zeros(head.latent_dim)
         chunks = counted(latent, latent.new_zeros(len(latent)))
     return chunks, counted.nfe
 

@@ -20,7 +20,7 @@ import yaml
 from genpolicy.tasks.api import load_task
 
 ROOT = Path(__file__).parents[2]
-TASK = "tabletop_insertion"
+TASKS = ("tabletop_insertion", "tight_insertion")
 PACKAGES = ("genpolicy", "gates", "stages", "flows")
 
 # Words that mean something of the library's own wherever they stand.
@@ -109,8 +109,13 @@ WORDS = {
 
 @cache
 def names() -> frozenset[str]:
-    """Bodies, sites, geoms, joints, phases, channels and modes of the task."""
-    task = load_task(TASK)
+    """Bodies, sites, geoms, joints, phases, channels and modes of the tasks."""
+    return frozenset().union(*map(names_of, TASKS))
+
+
+def names_of(name: str) -> frozenset[str]:
+    """The same of one task."""
+    task = load_task(name)
     model = mujoco.MjModel.from_xml_path(str(task.scene_path))
     of_scene = {
         get(i).name
@@ -179,7 +184,8 @@ def outside() -> list[Path]:
         path
         for package in PACKAGES
         for path in sorted((ROOT / package).rglob("*"))
-        if path.suffix in {".py", ".yaml", ".html"} and f"tasks/{TASK}/" not in path.as_posix()
+        if path.suffix in {".py", ".yaml", ".html"}
+        and not any(f"tasks/{task}/" in path.as_posix() for task in TASKS)
     ]
 
 

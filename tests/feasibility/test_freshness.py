@@ -9,7 +9,7 @@ import pytest
 from genpolicy.execution.checks import CHECKS, Place, at, without
 from genpolicy.feasibility.checks import CHECKS as TABLE
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.freshness import REASONS, fresh, fresh_many
+from genpolicy.feasibility.freshness import REASONS, fresh
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +20,11 @@ def moment(kit):
         latest_observation_event_time_s=9.95, maximum_age_s=0.3, active_checkpoint_hash="w",
         active_sampler_hash="s", scene=None,
     )  # fmt: skip
+
+
+def alone(metadata, context, **options):
+    """The margins of one chunk."""
+    return fresh([metadata], [context], **options)[0]
 
 
 FAULTS = {
@@ -36,7 +41,7 @@ FAULTS = {
 
 
 def test_the_layer_asks_exactly_its_rows(kit, moment):
-    margins = fresh(kit.metadata(), moment)
+    margins = alone(kit.metadata(), moment)
     assert set(margins) == {c.name for c in TABLE if c.layer == "fresh"} == set(FAULTS)
     assert all(margin >= 0 for margin in margins.values())
     assert margins["stale_observation"] == pytest.approx(0.2, abs=1e-9)
@@ -47,9 +52,9 @@ def test_the_layer_asks_exactly_its_rows(kit, moment):
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_fault_is_named_alone_and_a_table_without_its_row_does_not_know_it(kit, moment, name):
     faulty = replace(moment, **FAULTS[name])
-    margins = fresh(kit.metadata(), faulty)
+    margins = alone(kit.metadata(), faulty)
     assert [key for key, margin in margins.items() if not margin >= 0] == [name]
-    rest = fresh(kit.metadata(), faulty, checks=without(CHECKS, name))
+    rest = alone(kit.metadata(), faulty, checks=without(CHECKS, name))
     assert set(rest) == set(margins) - {name} and all(margin >= 0 for margin in rest.values())
 
 
@@ -62,7 +67,7 @@ def test_a_row_has_one_name_and_one_reason_wherever_it_is_asked():
 
 @pytest.mark.parametrize("field", ["now_s", "maximum_age_s", "latest_observation_event_time_s"])
 def test_a_time_that_is_no_number_passes_nothing(kit, moment, field):
-    margins = fresh(kit.metadata(), replace(moment, **{field: math.nan}))
+    margins = alone(kit.metadata(), replace(moment, **{field: math.nan}))
     assert margins and not any(margin >= 0 for margin in margins.values())
 
 
@@ -70,7 +75,7 @@ def test_many_are_asked_as_one_by_one_also_of_contexts_that_some_share(kit, mome
     late, lost = replace(moment, now_s=moment.now_s + 1.0), replace(moment, now_s=math.nan)
     chunks = [kit.metadata(), kit.metadata(task_phase="insert"), kit.metadata(session_epoch=9)]
     asked = [(chunk, context) for chunk in chunks for context in (moment, late, moment, lost)]
-    found = fresh_many(*map(list, zip(*asked, strict=True)))
+    found = fresh(*map(list, zip(*asked, strict=True)))
     for margins, (chunk, context) in zip(found, asked, strict=True):
-        assert margins == pytest.approx(fresh(chunk, context), abs=0.0, nan_ok=True)
+        assert margins == pytest.approx(alone(chunk, context), abs=0.0, nan_ok=True)
     assert len({str(margins) for margins in found}) == 7  # three chunks, now and late; no time

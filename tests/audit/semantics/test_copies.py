@@ -2,47 +2,13 @@
 
 import numpy as np
 import pytest
-from arms import SETTINGS, arms, build, parts, rebuilt, some
+from arms import SETTINGS, arms, build, parts, rebuilt
+from joining import copied, joined, kinds
 
 from genpolicy.audit.data import canonical
 from genpolicy.audit.semantics import copies, measure
 from genpolicy.audit.semantics.motion import make_motion
 from genpolicy.seeds import stream
-
-
-def kinds(data):
-    return [finding.kind for finding in measure(data, SETTINGS).findings]
-
-
-def joined(data, chosen, other):
-    commands, seen = parts(data)
-    rows = list(zip(commands, seen, strict=True))
-    for k in np.flatnonzero(chosen):
-        second = other(k) % len(rows)
-        commands[k] = np.vstack([rows[k][0], rows[second][0]])
-        seen[k] = np.vstack([rows[k][1], rows[second][1]])
-    return rebuilt(data, commands, seen)
-
-
-def copied(data, share, *, late=0, keep=1.0, noise=0.0):
-    """A share of the episodes appended again: begun later, cut, with noise."""
-    commands, seen = parts(data)
-    rng = stream(9, "copied")
-    for k in rng.choice(len(commands), round(share * len(commands)), replace=False):
-        last = late + int(keep * (len(commands[k]) - late))
-        commands.append(commands[k][late:last])
-        copy = seen[k][late:last]
-        seen.append(copy + noise * rng.normal(size=copy.shape))
-    return build(commands, seen, epochs=2, period_s=data.period_s)
-
-
-@pytest.mark.parametrize(
-    "how", [{}, {"late": 5}, {"keep": 0.7}, {"noise": 5e-5}, {"late": 3, "keep": 0.8}]
-)
-def test_copies_are_named(how):
-    found = measure(copied(arms(50), 0.1, **how), SETTINGS)
-    assert [finding.kind for finding in found.findings] == ["duplicate"]
-    assert "6 of 66 episodes are copies" in found.findings[0].action
 
 
 def test_a_single_copy_is_a_mishap_and_a_repeated_demonstration_no_copy():
@@ -80,19 +46,6 @@ def test_what_agrees_in_many_columns_and_goes_on_two_sides_is_no_copy(kind):
         twice = copied(data, 0.1)
         found = copies.find_copies(twice, make_motion(twice)).duplicate
         assert np.flatnonzero(found).tolist() == list(range(60, 66))
-
-
-@pytest.mark.parametrize("share", [0.1, 1.0])
-def test_episodes_glued_to_themselves_are_named(share):
-    data = arms(53)
-    found = kinds(joined(data, some(data, share), lambda k: k))
-    assert found and set(found) == {"glued"}
-
-
-def test_episodes_glued_to_the_next_are_named_and_no_clock():
-    data = arms(54)
-    found = kinds(joined(data, some(data, 0.3), lambda k: k + 1))
-    assert found[0] == "glued" and set(found) <= {"glued", "duplicate"}
 
 
 def test_a_way_gone_twice_is_not_glued():
