@@ -92,7 +92,7 @@ def test_the_page_shows_the_table_and_folds_the_rest(copied, judged):
     assert "geometric: scene collision" in html and "left 3 of 160, right 3 of 160" in html
     found = re.findall(r"<details><summary>([^<]*\(\d+\))</summary>", html)
     assert found == [
-        "Every phase with every mode (5)", "Reasons that rejected nothing (39)",
+        "Every phase with every mode (5)", "Reasons that rejected nothing (40)",
         "What corrupted fixtures were to be refused for, and were (5)",
         "Every check that was the closest (10)",
         "Every condition (30)", "Every phase (12)",
