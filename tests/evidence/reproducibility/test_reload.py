@@ -197,8 +197,8 @@ def test_weights_that_give_no_numbers_under_a_sampler_are_rows_and_end_nothing(
     plan, candidates, folder = reloaded
     honest = methods.sample_ode
 
-    def diverging(velocity, noise, *, name, steps: int):
-        drawn = honest(velocity, noise, name=name, steps=steps).clone()
+    def diverging(velocity, noise, *, name, steps: int, skipped: int):
+        drawn = honest(velocity, noise, name=name, steps=steps, skipped=skipped).clone()
         if (name, steps) == ("euler", diverged):
             drawn[drawn[:, 0, 0] > 0.0] = float("inf")
         return drawn
