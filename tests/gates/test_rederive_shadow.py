@@ -214,7 +214,7 @@ def test_what_a_layer_states_follows_from_the_margins_of_its_checks(root, moment
 def test_margins_of_fewer_checks_are_refused(root, moments):
     rows = read_rows(root / SHADOW / "candidates.parquet", CandidateRow)
     short = replace(rows[0], margins=rows[0].margins[:-1])
-    with pytest.raises(RefusedError, match=r"margins is 40, .*those of 41 checks"):
+    with pytest.raises(RefusedError, match=r"margins is 41, .*those of 42 checks"):
         module._hold_margins([short], gauges_of(moments[0].checker))
 
 
