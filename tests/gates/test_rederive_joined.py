@@ -183,15 +183,6 @@ def fixed_shorter(votes, *, rows, frozen):
     return prefix(votes, rows=rows, frozen=frozen - 3)
 
 
-@pytest.mark.parametrize("forged", [freely, elsewhere, fixed_shorter])
-def test_what_was_drawn_to_go_on_from_something_else_is_refused(root, rolled, monkeypatch, forged):
-    monkeypatch.setattr(product, "prefix", forged)
-    path = rolled(GUIDED)
-    assert not seen_by_the_checker(path, GUIDED)
-    with pytest.raises(RefusedError, match=r"candidate \d is (up to .* beside it|drawn as \w+)"):
-        rederive_rollout_draws(root, params_of(GUIDED), [path])
-
-
 def cold(votes, *, rows):
     actions, weights = rest_of_plan(votes, rows=rows)
     return actions, np.zeros_like(weights)
@@ -210,13 +201,19 @@ def only_what_may_be_executed(votes, *, rows):
     return actions, weights
 
 
-@pytest.mark.parametrize("forged", [cold, beside, only_what_may_be_executed])
-def test_what_started_from_something_else_is_refused(root, rolled, monkeypatch, forged):
-    monkeypatch.setattr(product, "rest_of_plan", forged)
-    path = rolled(WARM)
-    assert not seen_by_the_checker(path, WARM)
+@pytest.mark.parametrize(("name", "rule", "forged"), [
+    ("prefix", GUIDED, freely), ("prefix", GUIDED, elsewhere), ("prefix", GUIDED, fixed_shorter),
+    ("rest_of_plan", WARM, cold), ("rest_of_plan", WARM, beside),
+    ("rest_of_plan", WARM, only_what_may_be_executed),
+])  # fmt: skip
+def test_what_went_on_or_started_from_something_else_is_refused(
+    root, rolled, monkeypatch, name, rule, forged
+):
+    monkeypatch.setattr(product, name, forged)
+    path = rolled(rule)
+    assert not seen_by_the_checker(path, rule)
     with pytest.raises(RefusedError, match=r"candidate \d is (up to .* beside it|drawn as \w+)"):
-        rederive_rollout_draws(root, params_of(WARM), [path])
+        rederive_rollout_draws(root, params_of(rule), [path])
 
 
 def test_another_strength_than_the_stated_one_is_refused(root, rolled, monkeypatch):
