@@ -30,8 +30,10 @@ class Before:
         choices: Their choices, with the share of each mode in the situation that is asked.
         past: Features of the past, as centred ranks between -0.5 and 0.5. Shape (n, P).
         present: The same of the present. Shape (n, F).
-        reached: Episodes with a choice anywhere that long after their start, whether or not the
-            clusters still stood together there. At the start nothing was seen before.
+        reached: Episodes with a choice between the modes anywhere that long after their start,
+            whether or not the clusters still stood together there. At the start nothing was seen
+            before. A few that split later inside one mode (another way round, after an event)
+            chose nothing that is asked about.
     """
 
     choices: Choices
@@ -73,7 +75,7 @@ def seen_before(
         rows = rows[[int(data.episode[row]) in place for row in rows]]
         rows = rows[rows - data.first_row[rows] >= gap]
         at = np.array([place[int(data.episode[row])] for row in rows], dtype=np.int64)
-        reached[at] = True
+        reached[at] |= _several(choices.mode[at])
         new, together = missing[at], STILL_TOGETHER - gaps[int(number)] > 0
         if not together or not new.any() or not _undecided(data, settings, rows, choices.mode[at]):
             continue
@@ -99,6 +101,9 @@ def seen_before(
 
 def _undecided(data: AuditInput, settings: AuditSettings, rows: Integers, modes: Integers) -> bool:
     """Whether rows of several modes, more than one of each, have not begun to go apart."""
-    counts = np.bincount(modes)
-    several = bool(np.count_nonzero(counts >= MINIMUM_PER_MODE) > 1)
-    return several and not courses_part(data, settings, rows, modes)
+    return _several(modes) and not courses_part(data, settings, rows, modes)
+
+
+def _several(modes: Integers) -> bool:
+    """Whether there are several modes, more than one of each."""
+    return bool(np.count_nonzero(np.bincount(modes) >= MINIMUM_PER_MODE) > 1)

@@ -109,6 +109,23 @@ def test_at_the_start_of_an_episode_nothing_was_seen_before():
     assert first and seen_before(data, settings, first, who).reached == 0
 
 
+def test_who_splits_later_inside_one_mode_chose_nothing_that_is_asked_about():
+    """Four of 367 episodes that turned off late left the past of all others unasked."""
+    data, settings, items, who = chosen()
+    gap = shortest_gap(settings)
+    late = [item for item in items if seen_before(data, settings, [item], who).reached > 3]
+    rows = late[0][0].members
+    inside = np.isin(who.episode, data.episode[rows[rows - data.first_row[rows] >= gap]])
+    assert late[0][1].count > 1 and np.count_nonzero(inside) > 3
+    same = replace(who, mode=np.where(inside, 0, who.mode))
+    assert seen_before(data, settings, late[:1], same).reached == 0
+    one, two = np.flatnonzero(inside)[:2]
+    for turned, reached in (([one], 0), ([one, two], np.count_nonzero(inside))):
+        mode = same.mode.copy()
+        mode[turned] = 1
+        assert seen_before(data, settings, late[:1], replace(who, mode=mode)).reached == reached
+
+
 def test_how_frequent_a_mode_is_is_read_where_the_past_is_asked():
     """While the lamp is seen, neighbours saw the same lamp: its word is no frequency of the mode.
 

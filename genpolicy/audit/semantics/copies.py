@@ -23,6 +23,8 @@ WINDOW = 8
 PROBES = 6
 NEIGHBOURS = 6
 LARGEST_WIDTH = 12
+# So many probes tell the usual distance between two episodes.
+PAIRED = 500
 COMPONENTS = 6
 # A copy's distance, as a share of the usual distance between two episodes at the same place.
 CLOSE = 0.05
@@ -100,8 +102,10 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     tree = cKDTree(points)
     nearest = tree.query(points[probes], k=NEIGHBOURS)
     distance, found = np.asarray(nearest[0]), np.asarray(nearest[1])
-    near = CLOSE * _usual_distance(points, segment, probes)
-    moving = replace(moving, usual=_usual_distance(*_sparse(moving.whole, places, segment, probes)))
+    some = probes[:: max(1, len(probes) // PAIRED)]
+    near = CLOSE * _usual_distance(points[some], segment[some])
+    usual = _usual_distance(_points(moving.whole, places[some]), segment[some])
+    moving = replace(moving, usual=usual)
     number, place = np.nonzero(distance <= near)
     probe, other = probes[number], found[number, place]
     rows = places[np.sort(np.stack([probe, other], axis=1)[probe != other], axis=1)]
@@ -208,25 +212,10 @@ def _probes(moving: Moving, places: Integers) -> Integers:
     return np.searchsorted(places, np.asarray(probes, dtype=np.int64))
 
 
-def _some(probes: Integers) -> Integers:
-    """Some five hundred of them."""
-    return probes[:: max(1, len(probes) // 500)]
-
-
-def _sparse(
-    whole: Array, places: Integers, segment: Integers, probes: Integers
-) -> tuple[Array, Integers, Integers]:
-    """Windows at some probes as points, the episode of each, and their numbers."""
-    chosen = _some(probes)
-    return _points(whole, places[chosen]), segment[chosen], np.arange(len(chosen))
-
-
-def _usual_distance(points: Array, segment: Integers, probes: Integers) -> float:
-    """Median distance between windows of different episodes, at probes."""
-    chosen = _some(probes)
-    apart = pdist(points[chosen])
-    other = pdist(segment[chosen][:, None].astype(np.float64)) > 0.0
-    return float(np.median(apart[other])) if other.any() else 0.0
+def _usual_distance(points: Array, segment: Integers) -> float:
+    """Median distance between windows of different episodes."""
+    other = pdist(segment[:, None].astype(np.float64)) > 0.0
+    return float(np.median(pdist(points)[other])) if other.any() else 0.0
 
 
 def _judge(result: Copies, moving: Moving, row: int, other: int) -> None:

@@ -14,26 +14,12 @@ from genpolicy.audit.settings import AuditSettings
 def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> list[Finding]:
     """Duplicates as a finding."""
     names, total = data.episodes.uuid, len(data.episodes)
-    findings = []
-    if some(copies.duplicate, total, settings.outlier_share):
-        pairs = [
-            f"{names[k]} of {names[copies.of[k]]}" for k in np.flatnonzero(copies.duplicate)[:3]
-        ]
-        count = int(copies.duplicate.sum())
-        findings.append(
-            Finding(
-                kind="duplicate",
-                variable="episode",
-                where=listed(names[copies.duplicate]),
-                question="faulty_episodes_share",
-                measured=count / total,
-                floor=settings.outlier_share,
-                unit="share",
-                action=f"{count} of {total} episodes are copies of others ({'; '.join(pairs)}): "
-                "keep one of each and repeat the audit.",
-            )
-        )
-    return findings
+    if not some(copies.duplicate, total, settings.outlier_share):
+        return []
+    first = np.flatnonzero(copies.duplicate)[:3]
+    pairs = "; ".join(f"{names[k]} of {names[copies.of[k]]}" for k in first)
+    what = f"are copies of others ({pairs}): keep one of each and repeat the audit."
+    return [_of_episodes("duplicate", names[copies.duplicate], total, settings, what)]
 
 
 def glued_findings(
@@ -57,19 +43,21 @@ def glued_findings(
     what = [f"hold the same rows twice ({twice})"] if twice else []
     if (jumps & ~copies.repeats_itself).any():
         what.append("jump in their middle")
-    return [_glued(data.episodes.uuid[either], total, settings, " or ".join(what))]
+    names = data.episodes.uuid[either]
+    said = f"{' or '.join(what)} ({listed(names)}): several recordings were joined. "
+    said += "Split them where they meet and repeat the audit."
+    return [_of_episodes("glued", names, total, settings, said)]
 
 
-def _glued(names: Text, total: int, settings: AuditSettings, what: str) -> Finding:
-    count = len(names)
+def _of_episodes(kind: str, names: Text, total: int, settings: AuditSettings, what: str) -> Finding:
+    """That of all episodes these are faulty, and what to do."""
     return Finding(
-        kind="glued",
+        kind=kind,
         variable="episode",
         where=listed(names),
         question="faulty_episodes_share",
-        measured=count / total,
+        measured=len(names) / total,
         floor=settings.outlier_share,
         unit="share",
-        action=f"{count} of {total} episodes {what} ({listed(names)}): several recordings were "
-        "joined. Split them where they meet and repeat the audit.",
+        action=f"{len(names)} of {total} episodes {what}",
     )
