@@ -88,9 +88,12 @@ ROOM := $(shell [ -w /dev/shm ] && df --output=avail -k /dev/shm 2>/dev/null | a
 WRITTEN_TO := $(or $(TMPDIR),$(ROOM),/tmp)
 test long: export TMPDIR := $(WRITTEN_TO)
 
+# Linters and types take one core for a minute or two: beside the tests, and told behind them.
 test: env
-	@code=0; $(MAKE) --no-print-directory lint || code=1; \
-	python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder || code=1; exit $$code
+	@code=0; said=$$(mktemp); $(MAKE) --no-print-directory lint > "$$said" 2>&1 & lint=$$!; \
+	trap 'kill $$lint 2> /dev/null || true; rm -f "$$said"' EXIT; \
+	python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder || code=1; \
+	wait $$lint || code=1; cat "$$said"; exit $$code
 
 long: env
 	@LONG=1 python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder -m long
