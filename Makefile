@@ -13,7 +13,7 @@
 #
 # Variables: TORCH_INDEX=<url>  another package index for torch (CPU or CUDA builds)
 #            PYTHON=<path>      another Python 3.11 (3.12 should do, 3.11 is tested)
-#            JOBS=<n>           test processes, default 2
+#            JOBS=<n>           test processes, default 3: on two cores one works while another waits
 #            SEED=<n>           seed of `make soak`, default 0
 #            VNU=<path>         vnu.jar (of the npm package vnu-jar): with it and Java `make test` has
 #                               the Nu HTML checker read every page; without, those tests are skipped
@@ -30,7 +30,7 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(CURDIR)/$(VENV)/bin
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
-JOBS ?= 2
+JOBS ?= 3
 SEED ?= 0
 export VNU
 PYTHON_LEROBOT ?= $(shell command -v python3.12 || command -v python3.13)
@@ -60,6 +60,7 @@ WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1
 help:
 	@sed -n '1,24p' Makefile | sed 's/^# \{0,1\}//'
 
+# What is imported is compiled then, which of all that is installed is a small part.
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
 	if [ ! -x $(BIN)/python ]; then \
@@ -69,8 +70,8 @@ env:
 	  "$(PYTHON)" -m venv $(VENV); \
 	fi; \
 	echo "Building the environment (once, a few minutes) ..."; \
-	$(BIN)/python -m pip install --quiet -c constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) setuptools "$(TORCH_PIN)"; \
-	$(BIN)/python -m pip install --quiet --no-build-isolation -c constraints.txt -e '.[dev]'; \
+	$(BIN)/python -m pip install --quiet --no-compile -c constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) setuptools "$(TORCH_PIN)"; \
+	$(BIN)/python -m pip install --quiet --no-compile --no-build-isolation -c constraints.txt -e '.[dev]'; \
 	echo "$(WANTED)" > $(VENV)/.ok
 
 ladder: env

@@ -31,6 +31,13 @@ FIRST = (
     "contracts/test_dead_code.py",
     "execution/test_soak.py",
     "wall_clock/test_proxy.py",
+    "audit/test_run.py",
+    "audit/semantics/test_brought.py",
+    "audit/test_columns.py",
+    "audit/test_looks.py",
+    "gates/test_rederive_shadow.py",
+    "wall_clock/test_clocks.py",
+    "audit/test_predictability.py",
     "ladder/test_whole_way.py",
     "ladder/test_kills.py",
     "ladder/test_who_failed_stays_out.py",
@@ -39,7 +46,7 @@ FIRST = (
     "ladder/test_truth.py",
     "ladder/test_settings.py",
 )
-"""Files of more than a minute, and those of the ladder; those that need none go on while it is
+"""Files of half a minute and more, and those of the ladder; those that need none go on while it is
 built, and are longer than that takes."""
 
 
