@@ -175,3 +175,43 @@ def test_tests_write_where_nothing_waits_for_a_disk_or_where_they_are_told(
     memory = Path("/dev/shm")
     room = memory.is_dir() and shutil.disk_usage(memory).free > 10_000_000 * 1024
     assert said.stdout == (told or ("/dev/shm" if room else "/tmp")) + "\n"
+
+
+LINTERS = ("ruff", "mypy", "lint-imports")
+
+
+@pytest.mark.parametrize("failing", [None, *LINTERS, "python"])
+def test_make_test_fails_where_tests_or_a_linter_do_and_says_what_it_said(
+    tmp_path: Path, failing: str | None
+) -> None:
+    """The linters run beside the tests: what they end with would be lost without being asked."""
+    programs = tmp_path / ".venv" / "bin"
+    programs.mkdir(parents=True)
+    for name in ("Makefile", "constraints.txt", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    for name in (*LINTERS, "python"):
+        late = "sleep 0.5; " if name == failing and name != "python" else ""
+        (programs / name).write_text(
+            f"#!/bin/bash\n{late}echo {name} ran\nexit {int(name == failing)}\n"
+        )
+        (programs / name).chmod(0o755)
+    asking = tmp_path / "asking.mk"
+    asking.write_text("include Makefile\nstamp:\n\t@echo '$(WANTED)' > .venv/.ok\n")
+    environment = {name: value for name, value in os.environ.items() if name != "MAKEFLAGS"}
+
+    def make(*words: str) -> "subprocess.CompletedProcess[str]":
+        return subprocess.run(
+            ["make", "--no-print-directory", "-C", str(tmp_path), *words],
+            env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    assert make("-f", "asking.mk", "stamp").returncode == 0
+    done = make("test")
+    assert (done.returncode != 0) == (failing is not None), done.stderr
+    for name in (*LINTERS, "python"):
+        assert f"{name} ran" in done.stdout
+    assert done.stdout.index("python ran") < done.stdout.index("ruff ran")
+
+
+def test_what_a_test_that_passed_wrote_is_gone(pytestconfig: pytest.Config) -> None:
+    assert pytestconfig.getini("tmp_path_retention_policy") == "failed"
