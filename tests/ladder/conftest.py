@@ -1,6 +1,5 @@
 """One finished ladder per session, by a real `dvc repro`, and a copy of it for each test."""
 
-import fcntl
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from _beside import BESIDE
+from built_once import built_once
 from ladder_workspace import ALWAYS_RUN, copy_of, make_small_ladder, repro
 
 from stages._stage import STAGES
@@ -22,23 +22,17 @@ def finished(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRe
 
     Processes of one parallel session share it: the first builds it, the others wait.
     """
-    base = tmp_path_factory.getbasetemp()
-    if hasattr(request.config, "workerinput"):
-        base = base.parent
-    workspace, done = base / "finished-ladder", base / "finished-ladder.done"
-    with (base / "finished-ladder.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not done.exists():
-            rmtree(workspace, ignore_errors=True)
-            outcome, ran = repro(make_small_ladder(workspace))
-            assert outcome.code == 0, outcome.sentence
-            assert (ran[0], ran[-1], len(ran)) == (
-                "record",
-                "gate_e",
-                len(STAGES) + len(BESIDE) - len(ALWAYS_RUN),
-            )
-            done.touch()
-    return workspace
+
+    def build(workspace: Path) -> None:
+        outcome, ran = repro(make_small_ladder(workspace))
+        assert outcome.code == 0, outcome.sentence
+        assert (ran[0], ran[-1], len(ran)) == (
+            "record",
+            "gate_e",
+            len(STAGES) + len(BESIDE) - len(ALWAYS_RUN),
+        )
+
+    return built_once(request, tmp_path_factory, "finished-ladder", build)
 
 
 @pytest.fixture

@@ -9,8 +9,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
 
 
+from built_once import built_once
+
+
 @pytest.fixture(scope="session")
-def audits(tmp_path_factory):
+def audits(tmp_path_factory, request):
     """Folder of the evidence by name of the case."""
     from audited_cases import CASES
     from planar import SETTINGS, audited
@@ -18,10 +21,12 @@ def audits(tmp_path_factory):
     from genpolicy.audit.documents import Obstacle
     from genpolicy.audit.evidence import write_evidence
 
-    made = {}
-    for name, options in CASES.items():
-        made[name] = tmp_path_factory.mktemp(name)
-        obstacles = [Obstacle(x_m=0.15, y_m=0.0, radius_m=0.04)]
-        result = audited(seed_of_audit=1, **options)
-        write_evidence(result, made[name], settings=SETTINGS, obstacles=obstacles)
-    return made
+    def build(folder):
+        for name, options in CASES.items():
+            (folder / name).mkdir(parents=True)
+            obstacles = [Obstacle(x_m=0.15, y_m=0.0, radius_m=0.04)]
+            result = audited(seed_of_audit=1, **options)
+            write_evidence(result, folder / name, settings=SETTINGS, obstacles=obstacles)
+
+    made = built_once(request, tmp_path_factory, "audits-of-cases", build)
+    return {name: made / name for name in CASES}
