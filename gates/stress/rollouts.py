@@ -9,10 +9,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator, mo
 from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
-from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.recount import Subset, Term, is_one, part_said, part_share
 from gates.report import Owner, Recount
 from gates.settings import CandidateSettings
+from gates.stress.itself import require_itself
 from gates.stress.stopped import starts_of
 from gates.stress.weights import Weights, explained, require_weights
 from gates.words import percent
@@ -30,8 +31,6 @@ FAULTS = f"{STRESS}/faults.parquet"
 """Missing where no policy in a process of its own was compared."""
 CURVES = f"{STRESS}/{SEVERITIES}"
 """Missing where success is shown against no severity."""
-SUCCESS = "success"
-"""How a rollout ended that succeeded."""
 NOMINAL = "nominal"
 DRILL = "recovery_drill"
 """Condition in which recovery is called for on every start, so that it is exercised."""
@@ -226,8 +225,8 @@ def rollouts(
 
     Raises:
         StoppedError: It is a candidate that was stopped, since it could no longer pass.
-        MissingEvidenceError: A condition is missing, has fewer starts than planned, or a rollout
-            counts as another end than the one it came to.
+        MissingEvidenceError: A condition is missing, has fewer starts than planned, or the row of a
+            rollout does not agree with itself (`require_itself`).
     """
     # Most measures of the gate ask for them, each for every method.
     path = f"{folder}/{ROLLED}"
@@ -248,23 +247,8 @@ def _rollouts(evidence: Evidence, settings: StressSettings, method: str, path: s
             f"{method} has {int(per_condition.min())} starts in {per_condition.idxmin()}, "
             f"planned {planned}"
         )
-    _require_as_it_ended(rows, method)
+    require_itself(rows, method)
     return rows
-
-
-def _require_as_it_ended(rows: pd.DataFrame, method: str) -> None:
-    """Success is judged and the end is not: a rollout in which they differ was edited, or is wrong.
-
-    Raises:
-        MissingEvidenceError: They differ.
-    """
-    differ = rows[flags(rows, "success") != (rows["outcome"] == SUCCESS).to_numpy()]
-    if len(differ):
-        row = differ.iloc[0]
-        raise MissingEvidenceError(
-            f"rollout {method}, {row['perturbation']}, start {row['start']}: success is "
-            f"{row['success']}, and it ended in {row['outcome']}"
-        )
 
 
 def within(table: str, condition: str, *terms: Term) -> Subset:

@@ -16,6 +16,7 @@ import pyarrow as pa
 import watched
 import yaml
 from layered import as_the_layers_say, said_of
+from ticked import as_it_ticked
 from watched import write_watched
 
 from gates import pipeline
@@ -429,7 +430,7 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     before = read_table(file).to_pandas()
     frame = change(before.copy())
     if path == "stress/rollouts.parquet":
-        frame = ended_as_it_counts(before, frame)
+        frame = as_it_ticked(before, ended_as_it_counts(before, frame))
     if path == "shadow/candidates.parquet":
         frame = as_the_layers_say(before, frame)
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))

@@ -2,7 +2,6 @@
 
 import evidence
 import pandas as pd
-import pyarrow as pa
 import pytest
 from asked import asked, settings_of
 from editing import cells
@@ -11,7 +10,6 @@ from pydantic import ValidationError
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.recount import AtLeast, Subset
 from gates.stress.rollouts import (
-    SUCCESS,
     StressSettings,
     in_every_condition,
     rollouts,
@@ -19,15 +17,9 @@ from gates.stress.rollouts import (
     within,
 )
 from gates.stress.trial import unmatched_starts
-from genpolicy.evidence.stress.state import Outcome
-from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE = "stress/rollouts.parquet"
-
-
-def test_the_gate_knows_how_a_success_is_called():
-    assert str(Outcome.SUCCESS) == SUCCESS
 
 
 def of(root, method="flow"):
@@ -84,7 +76,7 @@ def test_a_count_of_starts_that_is_no_whole_number_is_rounded_down(ladder):
         won = twice["start"] < 11
         lost = frame.assign(success=frame["success"] & ~nominal)
         frame = pd.concat([lost, twice.assign(success=won)])
-        ended = frame["outcome"].where(frame["success"], "failed").mask(frame["success"], SUCCESS)
+        ended = frame["outcome"].where(frame["success"], "failed").mask(frame["success"], "success")
         return frame.assign(outcome=ended)
 
     settings = settings_of(ladder, "D")
@@ -93,29 +85,6 @@ def test_a_count_of_starts_that_is_no_whole_number_is_rounded_down(ladder):
     assert len(rows[rows["perturbation"] == "nominal"]) == 2 * evidence.STARTS
     found = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
     assert found.value == clopper_pearson(5, evidence.STARTS, settings.confidence)[0]
-
-
-@pytest.mark.parametrize(
-    ("success", "outcome"), [(True, "collision"), (True, ""), (False, "success")]
-)
-def test_a_rollout_counts_as_it_ended(ladder, success, outcome):
-    """Rollouts marked as successes, whose end was left as it was, passed until their journals
-    were read again."""
-
-    def change(frame):
-        hit = (frame["method"] == "flow") & (frame["start"] == 3)
-        hit &= frame["perturbation"] == "camera_delay"
-        frame = frame.assign(success=frame["success"].mask(hit, success))
-        return frame.assign(outcome=frame["outcome"].mask(hit, outcome))
-
-    assert len(of(ladder))
-    file = ladder / "artifacts" / TABLE
-    frame = change(read_table(file).to_pandas())
-    write_table(file, pa.Table.from_pandas(frame, preserve_index=False))
-    told = rf"rollout flow, camera_delay, start 3: success is {success}, and it ended in {outcome}"
-    with pytest.raises(MissingEvidenceError, match=told):
-        of(ladder)
-    assert len(of(ladder, "diffusion"))
 
 
 def test_a_rollout_without_outcome_is_missing_evidence(ladder):

@@ -21,7 +21,7 @@ def of(frame, condition=None):
 
 def silenced(root, condition):
     """It holds for the whole time, is late with everything and succeeds nowhere."""
-    for column, value in (("action_ticks", 0), ("fallback_ticks", 0), ("hold_ticks", 160)):
+    for column, value in (("fallback_ticks", 0), ("hold_ticks", 160), ("action_ticks", 0)):
         change = cells(column, value, where=lambda f: of(f, condition))
         evidence.edit_table(root, ROLLOUTS, change)
 
