@@ -97,13 +97,14 @@ def _tables(
     if not np.isin(worth, (0.0, LEAST_OF_A_SUCCESS, 1.0) if settings.utility else (0.0, 1.0)).all():
         raise ValueError("the whole rule is asked of one checkpoint of each candidate")
     rows = _rollouts(methods, worth, settings, rng)
-    judged_rows = rows[rows["method"].isin(settings.candidates)]
+    stand = rows["method"].isin(settings.candidates)
+    judged_rows, simple_rows = rows[stand], rows[~stand]
     cells = pd.MultiIndex.from_product([methods, CONDITIONS], names=["method", "perturbation"])
     frame = cells.to_frame(index=False)
     tables = {
         ROLLOUTS: rows,
         RECOVERIES: _recoveries(rows),
-        INVOCATIONS: _invocations(judged_rows, rng),
+        INVOCATIONS: pd.concat([_invocations(judged_rows, rng), _invocations(simple_rows)]),
         f"{STRESS}/stub.parquet": frame.assign(arrivals=500, stale=0, invalid=0),
         f"{STRESS}/counts.parquet": frame.assign(reason="expired", count=10),
         f"{STRESS}/conservation.parquet": frame.assign(
@@ -168,11 +169,13 @@ HELD, FELL_BACK, MISSED, REJECTED, CALLED = 0.05, 0.02, 0.05, 0.05, 0.01
 """Shares of ticks, of invocations and of rollouts: a sound policy, well inside the limits."""
 
 
-def _invocations(rows: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+def _invocations(rows: pd.DataFrame, rng: np.random.Generator | None = None) -> pd.DataFrame:
+    """Answers of each rollout; without a generator each takes as long, as nobody asks of them."""
     columns = ["method", "seed", "perturbation", "start"]
     frame = rows[columns].loc[rows.index.repeat(ASKED)].reset_index(drop=True)
     number = np.tile(np.arange(ASKED), len(rows))
-    latency: Array = 0.1 * np.exp(0.3 * rng.standard_normal(len(frame)))
+    spread = np.zeros(len(frame)) if rng is None else 0.3 * rng.standard_normal(len(frame))
+    latency: Array = 0.1 * np.exp(spread)
     return frame.assign(invocation=number, latency_s=latency)
 
 

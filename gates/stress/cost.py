@@ -18,6 +18,7 @@ from gates.floors import OLDEST_ACTION_S
 from gates.recount import AtLeast, Subset, Term, is_one
 from gates.report import Recount
 from gates.stress.contact import touched
+from gates.stress.invoked import INVOKED, invocations
 from gates.stress.rollouts import (
     CURVES,
     DRILL,
@@ -35,13 +36,11 @@ from gates.stress.rollouts import (
 from gates.stress.stopped import stopped_by
 from gates.words import duration, number, percent, three
 from genpolicy.evidence.documents.stress import DISTILLED
-from genpolicy.evidence.rows.stress import FaultRow, InvocationRow
+from genpolicy.evidence.rows.stress import FaultRow
 from genpolicy.statistics.clustered import ratio_interval
 
 STOPS = ("collision", "force_stop")
 """Outcomes (`genpolicy.evidence.stress.state`) that stay until a person resets the cell."""
-INVOKED = "invocations"
-"""The column of rollouts that counts them."""
 TOO_OLD = "beyond the maximum action age"
 """Said of a first answer that comes when nothing of it may be executed any more."""
 WARM = AtLeast("invocation", 1)
@@ -89,20 +88,11 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     The first invocation of a session is cold and before any motion; it is said apart, and so is
     what a distilled candidate's training took, which bought the answer's speed.
     """
-    rows = evidence.of(INVOCATIONS, InvocationRow, candidate)
+    rows = invocations(evidence, settings, candidate)
     latency = numbers(rows, "latency_s")
     if not np.all(latency >= 0):
         raise MissingEvidenceError("a latency is negative: the clocks are wrong")
-    keys = ["seed", "perturbation", "start"]
-    recorded = rows.groupby(keys)["invocation"].nunique().to_dict()
     rolled = rollouts(evidence, settings, candidate)
-    stated = zip(
-        zip(*(rolled[name] for name in keys), strict=True),
-        numbers(rolled, INVOKED),
-        strict=True,
-    )
-    if any(recorded.get(key, 0) != count for key, count in stated):
-        raise MissingEvidenceError("rollouts state other numbers of invocations than are recorded")
 
     def measure(part: pd.DataFrame, subset: Subset, condition: str) -> tuple[Interval, Recount]:
         if len(part) == 0:

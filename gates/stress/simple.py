@@ -1,15 +1,17 @@
 """Were the simple methods met at all, and as the candidates are?
 
-A gain over a simple method is one over what it does. One that commanded nothing, that reached the
-stub past the safety path, or whose actions do not add up was not compared: whoever beats it has
-beaten a fault of the comparison. What a candidate is refused for, waiting or late and rejected
-answers, a simple method may do: it is worth less by that. Then it is said, since that gain is one
-of timing or feasibility, and another distribution may have nothing to do with it.
+A gain over a simple method is one over what it does. One that commanded nothing, of whose
+invocations some are not recorded, that reached the stub past the safety path, or whose actions do
+not add up was not compared: whoever beats it has beaten a fault of the comparison. What a candidate
+is refused for, waiting or late and rejected answers, a simple method may do: it is worth less by
+that. Then it is said, since that gain is one of timing or feasibility, and another distribution may
+have nothing to do with it.
 """
 
 from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.feasibility.arrivals import require_played
+from gates.stress.invoked import invocations
 from gates.stress.rollouts import StressSettings, rollouts
 from gates.stress.safety import STUB, unaccounted
 from gates.words import percent
@@ -31,14 +33,16 @@ def require_met(evidence: Evidence, settings: StressSettings) -> None:
 
     Raises:
         MissingEvidenceError: In a planned condition a simple method commanded nothing, has no row
-            at the stub or none of its balance of actions; a stale or invalid action of it reached
-            the stub; or its actions do not add up.
+            at the stub or none of its balance of actions; a rollout of it states another number of
+            invocations than is recorded; a stale or invalid action of it reached the stub; or its
+            actions do not add up.
     """
     for name in settings.baselines:
         if not settings.limits.rehearsed and (silent := _silent(evidence, settings, name)):
             raise MissingEvidenceError(
                 f"{name} commanded nothing in {', '.join(silent)}: nothing is shown by beating it"
             )
+        invocations(evidence, settings, name)  # of what it was asked, nothing may lack
         stub = evidence.of(STUB, StressStubRow, name)
         require_played(stub, "perturbation", settings.perturbations)
         if bad := sum(float(counts(stub, column).sum()) for column in ("stale", "invalid")):

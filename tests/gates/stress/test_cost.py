@@ -254,16 +254,20 @@ def test_a_rollout_that_asked_nothing_has_nothing_recorded(ladder):
 
 
 def test_of_no_invocation_no_share_is_known_and_no_answer_is_timed(ladder):
-    """Every picture is lost in one condition: counted and without a verdict, and no crash."""
-    none = in_("camera_delay")
+    """Every picture is lost in one condition: counted and without a verdict, and no crash.
+
+    Nobody commands there but the fallback, as where it is drilled, which is no cost of a candidate.
+    """
+    none = in_("recovery_drill")
     evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~none(f)])
     for column in ("invocations", "deadline_misses", "rejections"):
         evidence.edit_table(ladder, ROLLOUTS, cells(column, 0, where=none))
-    said = f"{N} of {N} rollouts in camera_delay without any invocation"
+    evidence.edit_table(ladder, ROLLOUTS, cells("fallback_ticks", 152, where=none))
+    said = f"{N} of {N} rollouts in recovery_drill without any invocation"
     for share in (cost.deadline_miss_upper, cost.rejection_share_upper):
         with pytest.raises(MissingEvidenceError, match=said):
             flow(ladder, share)
-    with pytest.raises(MissingEvidenceError, match="no warm invocation in camera_delay"):
+    with pytest.raises(MissingEvidenceError, match="no warm invocation in recovery_drill"):
         flow(ladder, cost.latency_p95_s)
     assert judge(ladder, "D").candidates["flow"] == "INCONCLUSIVE"
 

@@ -51,6 +51,51 @@ def test_nobody_is_promoted_over_who_commanded_nothing_in_one_condition(ladder, 
         assert f"{SIMPLE} commanded nothing in {condition}: nothing" in criterion.caveat
 
 
+INVOCATIONS = "stress/invocations.parquet"
+
+
+def condition_lost(frame):
+    return of(frame, "envelope")
+
+
+def start_lost(frame):
+    return of(frame, "envelope") & (frame["start"] == 4)
+
+
+def answer_lost(frame):
+    return start_lost(frame) & (frame["invocation"] == 2)
+
+
+@pytest.mark.parametrize(
+    ("lost", "told"),
+    [
+        (of, f"no rows of {SIMPLE}"),
+        (condition_lost, f"rollout {SIMPLE}, envelope, start 0 states 20, recorded are 0"),
+        (start_lost, f"rollout {SIMPLE}, envelope, start 4 states 20, recorded are 0"),
+        (answer_lost, f"rollout {SIMPLE}, envelope, start 4 states 20, recorded are 19"),
+    ],
+)
+def test_a_simple_method_of_whose_invocations_some_lack_was_not_compared(ladder, lost, told):
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~lost(f)])
+    with pytest.raises(MissingEvidenceError, match=told):
+        asked(ladder)
+
+
+def test_nobody_is_promoted_over_who_has_no_invocations_in_one_condition(ladder):
+    """Its rollouts say that it commanded there; who was asked, and how long it took, nobody knows.
+
+    A rehearsal is refused too: hardly trained networks are asked as any others.
+    """
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~condition_lost(f)])
+    report = judge(ladder, "D")
+    assert report.promoted is None and report.verdict == "INCONCLUSIVE"
+    for criterion in gains(report).values():
+        assert criterion.verdict == "INCONCLUSIVE" and "recorded are 0" in criterion.caveat
+    evidence.write_params(ladder, lambda p: p.update(rehearsal=True))
+    with pytest.raises(MissingEvidenceError, match="recorded are 0"):
+        asked(ladder)
+
+
 def test_one_command_is_one(ladder):
     silenced(ladder, "nominal")
     one = cells("action_ticks", 1, where=lambda f: of(f, "nominal") & (f["start"] == 4))
