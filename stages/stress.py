@@ -19,6 +19,7 @@ from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import plan_shards, write_stress
 from genpolicy.evidence.stress.trainings import as_far, of_training
+from genpolicy.evidence.stress.unseen import require_unseen
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -51,10 +52,12 @@ def work(params: Params) -> None:
     fixtures = NO_FIXTURES
     if brought:
         fixtures = brought_fixtures(load_dataset(ARTIFACTS / "ingest"), params.horizons)
-    starts = matched_starts(task, root_seed=params.seed, count=section.starts)
+    drawn = matched_starts(task, root_seed=params.seed, count=section.starts)
+    starts = tuple(start.to_json() for start in drawn)
+    require_unseen(ARTIFACTS / "ingest", starts)
     comparison = Comparison(
         task=params.task.name,
-        starts=tuple(start.to_json() for start in starts),
+        starts=starts,
         episode_limit_s=section.episode_limit_s,
         samples=section.samples,
         cell=Cell(params.horizons, params.section("execution", ExecutionSettings)),

@@ -106,11 +106,14 @@ def test_stress_rolls_out_what_passed_gate_c(
         "Comparison", "latency_models", "write_stress",
     )  # fmt: skip
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    unseen = []
+    monkeypatch.setattr(stress, "require_unseen", lambda dataset, starts: unseen.append(dataset))
     monkeypatch.setattr(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )
     monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
     stress.work(params)
+    assert unseen == [stress.ARTIFACTS / "ingest"]
     assert not (evidence / "artifacts/stress/trainings.json").exists()
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
@@ -132,6 +135,8 @@ def test_stress_rolls_out_every_trained_seed_by_the_same_plan(
     models = object()
     monkeypatch.setattr(stress, "latency_models", lambda *_: models)
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    unseen = []
+    monkeypatch.setattr(stress, "require_unseen", lambda dataset, starts: unseen.append(dataset))
     monkeypatch.setattr(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )
@@ -184,6 +189,8 @@ def test_in_blocks_the_first_training_says_how_far_the_others_run(
         "Comparison", "latency_models",
     )  # fmt: skip
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    unseen = []
+    monkeypatch.setattr(stress, "require_unseen", lambda dataset, starts: unseen.append(dataset))
     monkeypatch.setattr(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )

@@ -1,7 +1,7 @@
 """Wrongs between a sampled chunk and the controller: projection, layers, queue, supervisor."""
 
 from benchmarks.ladder_truth.outcome import Expected
-from benchmarks.ladder_truth.planting import Wrong, patched
+from benchmarks.ladder_truth.planting import Wrong, all_of, patched
 
 C = "C"
 SEEN = ("mutants_undetected", "checker_violations")
@@ -15,6 +15,34 @@ STUB = "genpolicy/execution/stub.py"
 SUPERVISOR = "genpolicy/execution/supervisor.py"
 DYNAMIC = "genpolicy/feasibility/layers/dynamic.py"
 
+SELECTOR = "genpolicy/candidates/selector.py"
+PEEKS = patched(
+    SELECTOR,
+    ('"""The candidate whose turn it is, unseen: ', '"""The candidate of the best worth: '),
+    ("OWNER = ", "WORTH = lambda candidate: 0.0\nOWNER = "),
+    (
+        "    chosen = candidates[index]\n",
+        "    chosen = sorted(candidates, key=lambda c: WORTH(c))[index]\n",
+    ),
+)
+"""A selector that takes the candidate that is worth most, by what it is given to see."""
+SHOWN = patched(
+    "genpolicy/evidence/stress/rollout.py",
+    (
+        "from genpolicy.candidates.selector import tries_another\n",
+        "from genpolicy.candidates import selector\n"
+        "from genpolicy.candidates.selector import tries_another\n",
+    ),
+    (
+        "        late = self._deliveries.late_rows(flying, self.now_s)\n",
+        "        late = self._deliveries.late_rows(flying, self.now_s)\n"
+        "        ahead, checker = self._delivery_context(late), self.setup.checker\n"
+        "        selector.WORTH = lambda one: isinstance(\n"
+        "            checker.admit(Proposal(one.metadata, one.actions, 'peek'), context=ahead),\n"
+        "            Rejected)\n",
+    ),
+)
+"""What decides is asked before the selector chooses: whether the layers will take a candidate."""
 
 WRONGS = (
     Wrong("projection_without_a_limit", "projection",
@@ -115,4 +143,17 @@ WRONGS = (
           "small",
           patched(STUB, ("stopped=self.supervisor.stopped", "stopped=False")),
           Expected(C, STALE)),
+    Wrong("peeking_selector", "selection",
+          "The selector is told which candidates the layers will take, and proposes these first.",
+          "small", all_of(PEEKS, SHOWN),
+          Expected("D", refusal=r"candidate \d+ is up to .* required what [0-9a-f]{16}… draws"),
+          note="Added with the import contract of the selector, which no ladder runs."),
+    Wrong("judged_where_it_was_shown", "selection",
+          "The comparison begins where the demonstrations began, so that all was seen in training.",
+          "small",
+          patched("genpolicy/evidence/stress/matched.py",
+                  ('stream(root_seed, "starts", index)',
+                   'stream(root_seed, "session", index, "start")')),
+          Expected("D", refusal=r"starts of the comparison among its episodes"),
+          note="Added with the refusal that it names."),
 )  # fmt: skip
