@@ -14,6 +14,7 @@ def as_it_ticked(before, frame):
         return frame
     was = before.reindex(frame.index)
     same = {name: frame[name].eq(was[name]) for name in (*PARTS, "ticks", "invocations")}
+    same["action_ticks"] |= was["action_ticks"].isna()  # of a row that was not there
     fewer = ~same["invocations"]
     for part in ("deadline_misses", "rejections"):
         frame[part] = frame[part].mask(fewer & (frame[part] > frame["invocations"]), 0)

@@ -91,7 +91,7 @@ def _with_planner(root, every=1):
         return pd.concat([frame, own], ignore_index=True)
 
     evidence.edit_table(root, TABLE, beside)
-    for name in ("stub", "conservation", "counts"):
+    for name in ("stub", "conservation", "counts", "invocations"):
         evidence.edit_table(root, f"stress/{name}.parquet", counted_beside)
     return Evidence(root), settings_of(root, "D")
 
