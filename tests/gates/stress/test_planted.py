@@ -16,6 +16,7 @@ from asked import found_in, settings_of
 from editing import cells
 from trained_more import trained_more
 
+from benchmarks.ladder_truth.catalogue.execution import WRONGS
 from gates.claim import CHECKPOINT_ONLY
 from gates.evidence import Evidence
 from gates.pages.page import gate_page
@@ -220,6 +221,21 @@ def test_no_demonstration_begins_where_the_comparison_begins():
         s.to_json() for s in matched_starts(load_task("tabletop_insertion"), root_seed=13, count=90)
     }
     assert len(compared) == 90 and not demonstrated & compared
+
+
+@pytest.mark.parametrize(
+    ("name", "item", "refused"),
+    [
+        ("peeking selector", "peeking_selector", "draws"),
+        ("tuned on the test starts", "judged_where_it_was_shown", "starts of the comparison"),
+    ],
+)
+def test_what_no_rows_show_is_planted_in_a_ladder_and_the_page_says_so(name, item, refused):
+    """Before Gate D is judged, or behind it: each has a test of its own beside what refuses it."""
+    (wrong,) = [wrong for wrong in WRONGS if wrong.name == item]
+    assert wrong.expected.gate == "D" and refused in wrong.expected.refusal
+    (line,) = [text for text in PAGE.read_text().splitlines() if text.startswith(f"| {name} |")]
+    assert f"`{item}`" in line
 
 
 def drawn(root, number, truth):
