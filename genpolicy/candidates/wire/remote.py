@@ -207,9 +207,16 @@ class RemotePolicy:
             line = dial(
                 self._address, allowed=self.entry.allow_host, timeout_s=self.entry.timeout_s
             )
-            told = getattr(self, "told", None)
-            if told is not None and capabilities(line.metadata) != told:
-                line.close()
-                raise PolicyError(Fault.CHANGED, "its metadata are others than at first")
+            try:
+                self._require_same(line)
+            except PolicyError:
+                line.close()  # nobody else holds this line
+                raise
             self._line = line
         return self._line
+
+    def _require_same(self, line: Connection) -> None:
+        """Hold it against what it said when it was first dialled; then there is nothing to hold."""
+        told = getattr(self, "told", None)
+        if told is not None and capabilities(line.metadata) != told:
+            raise PolicyError(Fault.CHANGED, "its metadata are others than at first")

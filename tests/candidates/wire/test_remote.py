@@ -4,7 +4,8 @@ import threading
 import numpy as np
 import pytest
 
-from genpolicy.candidates.wire.connection import Connection
+from genpolicy.candidates.wire import remote
+from genpolicy.candidates.wire.connection import Connection, dial
 from genpolicy.candidates.wire.extension import WORD
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.remote import RemotePolicy
@@ -136,6 +137,34 @@ def test_a_server_that_became_another_is_refused_when_it_is_dialled_again(line, 
     with pytest.raises(PolicyError, match="others than at first") as error:
         policy.invoke(seen, noise=("a",), candidates=1)
     assert error.value.fault is Fault.CHANGED
+
+
+@pytest.mark.parametrize(
+    ("can", "fault"),
+    [({"checkpoint": 5}, Fault.MALFORMED), ({"seeded": False}, Fault.CHANGED)],
+)
+def test_a_line_that_is_dialled_again_and_begins_wrongly_is_hung_up(
+    line, seen, monkeypatch, can, fault
+):
+    """Wrong before: each invocation left a socket and its thread behind, until none was left."""
+    planted = Planted()
+    metadata, dialled = {WORD: dict(planted.can)}, []
+    policy = line(planted, metadata=metadata)
+    policy.close()
+    metadata[WORD] |= can
+
+    def kept(*given, **named):
+        dialled.append(dial(*given, **named))
+        return dialled[-1]
+
+    monkeypatch.setattr(remote, "dial", kept)
+    for ask in (lambda: policy.invoke(seen, noise=("a",), candidates=1), policy.round_trip_s):
+        with pytest.raises(PolicyError) as error:
+            ask()
+        assert error.value.fault is fault
+    for one in dialled:
+        one._socket.recv_events_thread.join(10)  # far more than hanging up takes
+    assert [one._socket.socket.fileno() for one in dialled] == [-1, -1]
 
 
 @pytest.mark.parametrize(
