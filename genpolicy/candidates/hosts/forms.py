@@ -7,6 +7,7 @@ from safetensors import SafetensorError, safe_open
 
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ScriptedEntry
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
+from genpolicy.candidates.hosts.lerobot_words import require_words
 from genpolicy.candidates.hosts.served_weights import require_served_weights
 from genpolicy.candidates.wire.entry import Entry, ServerEntry
 from genpolicy.errors import BadInputError, ConfigError
@@ -24,7 +25,8 @@ def require_forms(entry: Entry, folder: Path) -> None:
 
     Raises:
         ConfigError: A module without the function; documents or weights of LeRobot that are none,
-            or processors of it that could run code; weights of a server that nothing pins.
+            or a config that may name a place, or processors that could run code; weights of a
+            server that nothing pins.
     """
     if isinstance(entry, ScriptedEntry):
         _require_function(folder / entry.file, entry.function.partition(":")[2])
@@ -32,6 +34,7 @@ def require_forms(entry: Entry, folder: Path) -> None:
         for name in entry.essential(folder):
             read = _require_document if name.endswith(".json") else _require_weights
             read(folder / name)
+        require_words(entry, folder)
         require_steps(entry, folder)
     elif isinstance(entry, ServerEntry):
         require_served_weights(entry, folder)

@@ -7,6 +7,7 @@ from pathlib import Path
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
 from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
+from genpolicy.candidates.hosts.lerobot_words import require_words
 from genpolicy.candidates.hosts.served_weights import require_served_weights
 from genpolicy.candidates.wire.channels import columns_of, widths_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
@@ -40,8 +41,8 @@ def as_server(
 
     Raises:
         ConfigError: Nothing on this machine runs it, or a checkpoint or policy of LeRobot takes or
-            gives something else than it says, or has processors that could run code, or weights of
-            a server are pinned by nothing.
+            gives something else than it says, or has a config that may name a place or processors
+            that could run code, or weights of a server are pinned by nothing.
         ContractError: It names what the observation does not have.
     """
     if isinstance(entry, ServerEntry):
@@ -51,6 +52,7 @@ def as_server(
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
     if isinstance(entry, LeRobotEntry):
         require_shapes(entry, path.resolve().parent, contract)
+        require_words(entry, path.resolve().parent)
         require_steps(entry, path.resolve().parent)
         command = _lerobot(entry)
     else:
