@@ -5,6 +5,7 @@ from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
+from genpolicy.candidates.hosts.commands import require_known_words
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ScriptedEntry
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
 from genpolicy.candidates.hosts.lerobot_words import require_words
@@ -26,7 +27,7 @@ def require_forms(entry: Entry, folder: Path) -> None:
     Raises:
         ConfigError: A module without the function; documents or weights of LeRobot that are none,
             or a config that may name a place, or processors that could run code; weights of a
-            server that nothing pins.
+            server that nothing pins, or what its command names elsewhere.
     """
     if isinstance(entry, ScriptedEntry):
         _require_function(folder / entry.file, entry.function.partition(":")[2])
@@ -38,6 +39,7 @@ def require_forms(entry: Entry, folder: Path) -> None:
         require_steps(entry, folder)
     elif isinstance(entry, ServerEntry):
         require_served_weights(entry, folder)
+        require_known_words(entry, folder)
 
 
 def _require_function(path: Path, name: str) -> None:

@@ -1,9 +1,9 @@
 """From an entry of any kind to the server that hosts it: one command, in a child of its own."""
 
-import re
 import sys
 from pathlib import Path
 
+from genpolicy.candidates.hosts.commands import module_files, require_known_words, words_of
 from genpolicy.candidates.hosts.kinds import LeRobotEntry, ProgramEntry, TrainedEntry
 from genpolicy.candidates.hosts.lerobot_shapes import require_shapes
 from genpolicy.candidates.hosts.lerobot_steps import require_steps
@@ -17,8 +17,6 @@ from genpolicy.integrity.hashing import sha256_file
 
 ROOT = Path(__file__).parents[3]
 ADAPTER = ROOT / "adapters" / "lerobot_server.py"
-INTERPRETER = re.compile(r"(python|pypy|node|perl|ruby|julia|bash|sh)[0-9.]*$")
-OPTION = re.compile(r"--?[A-Za-z][\w-]*=")
 HERE = (
     "import sys; at = [*map(lambda p: p.endswith('site-packages'), sys.path), True].index(True); "
     "sys.path[at:at] = [sys.argv.pop(1)]; "
@@ -47,6 +45,7 @@ def as_server(
     """
     if isinstance(entry, ServerEntry):
         require_served_weights(entry, path.resolve().parent)
+        require_known_words(entry, path.resolve().parent)
         return entry
     entry.require_host()
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
@@ -66,8 +65,8 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
     """What runs a candidate, beside the files that are it: SHA-256 by path.
 
     Our own host is none of it: every stage that starts one depends on its code. What an
-    environment has installed, an interpreter among it, is bound by nothing; nor is a module that
-    `-m` names, or whatever a script imports or reads, unless it stands in `files`.
+    environment has installed, an interpreter among it, is none of it (see `installed_module`); nor
+    is whatever a script or module imports or reads, unless it stands in `files`.
 
     Args:
         entry: What it is.
@@ -75,7 +74,8 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
 
     Returns:
         Of a LeRobot policy the adapter; of a server the files that words of its command name from
-        the folder, as they are or behind `--x=`; of a link its target. Empty of the others.
+        the folder, as they are or behind `--x=`, and those that a module behind `-m` begins with;
+        of a link its target. Empty of the others.
 
     Raises:
         IntegrityError: One cannot be read.
@@ -84,10 +84,7 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
         return {f"adapters/{ADAPTER.name}": sha256_file(ADAPTER)} if ADAPTER.is_file() else {}
     if not isinstance(entry, ServerEntry):
         return {}
-    command = list(entry.command or ())
-    if command and INTERPRETER.match(Path(command[0]).name):
-        command = command[1:]
-    named = [word.partition("=")[2] if OPTION.match(word) else word for word in command]
+    named = [*words_of(entry), *module_files(entry, folder)]
     return {
         word: sha256_file((folder / word).resolve())  # of a link, what it leads to
         for word in named

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.commands import installed_module
 from genpolicy.candidates.hosts.translation import program_files
+from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.documents.document import Count, Document
 
 
@@ -18,7 +20,8 @@ class Brought:
         sha256: Of what its entry says.
         files: What it is: SHA-256 of each file, by path from the entry's folder.
         program: What runs it beside them: SHA-256 of the adapter, or of each file that its command
-            names from that folder.
+            names from that folder; of an installed module that it names, by `name==version`, of
+            what the record of the distribution says of the module's files.
         started_here: Whether the ladder starts its server; else somebody else does.
         stochastic: Whether its candidates differ; else one is drawn.
         dataset: SHA-256 of the manifest of the dataset that it was trained on; empty if unsaid.
@@ -67,7 +70,7 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
             author=policy.entry.author,
             sha256=policy.sha256,
             files=dict(policy.entry.files),
-            program=program_files(policy.entry, policy.folder),
+            program=_program(policy),
             started_here=policy.entry.started_here,
             stochastic=policy.entry.stochastic,
             dataset=policy.entry.declared.dataset if policy.entry.declared else "",
@@ -75,3 +78,10 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
         )
         for policy in policies
     }
+
+
+def _program(policy: BroughtPolicy) -> dict[str, str]:
+    found = program_files(policy.entry, policy.folder)
+    if isinstance(policy.entry, ServerEntry):
+        found |= installed_module(policy.entry, policy.folder)
+    return found

@@ -91,6 +91,9 @@ def test_what_its_command_names_comes_along(own):
     (own / "own/flow/config.json").write_text("{}")
     files = set(files_of_the_run(own))
     assert {"own/mine.yaml", "own/serve", "own/serve.py", "own/flow/config.json"} <= files
+    module = {**said, "command": ["python", "-m", "serve", "--port={port}"]}
+    (own / "own/mine.yaml").write_text(yaml.safe_dump(module))
+    assert "own/serve.py" in files_of_the_run(own)
     (own / "own/serve.py").rename(own / "own/real.py")
     (own / "own/serve.py").symlink_to("real.py")
     with pytest.raises(ConfigError, match=r"own/serve\.py, which lies .* behind a link"):
