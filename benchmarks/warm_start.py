@@ -156,7 +156,7 @@ def row_of(judged: JudgedPolicy, strength: float, given: argparse.Namespace) -> 
     events = [event for rollout in rollouts for event in rollout.journal.events()]
     judged_ones = [event.payload for event in events if event.kind == "candidate"]
     passed = [all(own is True for own in one["layers"].values()) for one in judged_ones]
-    nfe, took_ms = sampled(policy, strength, given.repeats)
+    nfe, took_ms = sampled(policy.policy, strength, given.repeats)
     changes, pairs = switched(policy, task)
     successes = sum(rollout.outcome is Outcome.SUCCESS for rollout in rollouts)
     return [
