@@ -42,6 +42,7 @@ class Named:
 
 PEOPLE, SIGNING, CARD = "gates/card/people.py", "gates/card/signing.py", "gates/card/card.py"
 JUDGE, TRIAL, ROLLOUTS = "gates/card/judge.py", "gates/stress/trial.py", "gates/stress/rollouts.py"
+ITSELF = "gates/stress/itself.py"
 BOUNDS, VERDICTS = "gates/bounds.py", "gates/verdicts.py"
 PAPERS = "gates/card/papers.py"
 STUB, QUEUE = "genpolicy/execution/stub.py", "genpolicy/execution/chunk_queue.py"
@@ -133,7 +134,11 @@ NAMED = (
     Named("what was not measured passes", VERDICTS,
           'if measured is None or limit is None:\n        return "INCONCLUSIVE"',
           'if measured is None or limit is None:\n        return "PASS"'),
-    Named("an unfinished rollout is a success", ROLLOUTS, "    if len(differ):", "    if False:"),
+    Named("an unfinished rollout is a success", ITSELF,
+          "chain(_ended(rows), _ticked(rows), ", "chain(_ticked(rows), "),
+    Named("ticks that are neither command, hold nor fallback", ITSELF,
+          "yield np.equal(sum(parts.values()), ticks), ",
+          "yield np.less_equal(sum(parts.values()), ticks), "),
     Named("a condition that nobody met", ROLLOUTS, "    if absent:", "    if False:"),
     Named("fewer starts than planned", ROLLOUTS,
           "if int(per_condition.min()) < planned:", "if False:"),
