@@ -139,7 +139,7 @@ def test_a_gate_that_waits_stops_only_where_everybody_had_signed(tmp_path: Path)
 
 AREAS = {
     "data", "labels", "leakage", "training", "checkpoint", "sampler", "projection", "queue",
-    "supervisor", "evidence", "code", "limits", "signatures", "brought policies",
+    "supervisor", "evidence", "code", "limits", "signatures", "brought policies", "selection",
 }  # fmt: skip
 """What can be wrong with a ladder; of each something is planted."""
 
