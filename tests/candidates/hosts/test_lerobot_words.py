@@ -26,7 +26,7 @@ WHOLE = {
     "act": {
         **ACT, **PUSHED, **BACKBONE, "feedforward_activation": "relu",
         "normalization_mapping": {"VISUAL": "MEAN_STD", "STATE": "MEAN_STD"},
-        "pretrained_path": "/mnt/outputs/act", "pretrained_revision": "main",
+        "pretrained_path": "/dev/shm/outputs/act", "pretrained_revision": "main",
     },
     "diffusion": {
         **DIFFUSION, **PUSHED, **BACKBONE, "pretrained_backbone_weights": None, "crop_shape": None,
