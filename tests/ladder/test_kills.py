@@ -21,7 +21,7 @@ DVC_STARTS_S = 2.0
 STAGES = (
     "ingest",
     pytest.param("audit", marks=pytest.mark.long),
-    "gate_a",
+    pytest.param("gate_a", marks=pytest.mark.long),
     pytest.param("shadow", marks=pytest.mark.long),
 )
 

@@ -232,7 +232,11 @@ NO_LIMIT = "required a limit in params.yaml"
 
 @pytest.mark.parametrize(
     ("gate", "stage"),
-    [("gate_a", "train_generators"), ("gate_c", "stress"), ("gate_d", "failure_search")],
+    [
+        ("gate_a", "train_generators"),
+        pytest.param("gate_c", "stress", marks=pytest.mark.long),
+        ("gate_d", "failure_search"),
+    ],
 )
 def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str) -> None:
     unlimited(copy, gate)

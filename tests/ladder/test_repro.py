@@ -118,6 +118,7 @@ def test_judging_one_gate_again_changes_its_report_only(copy: Path) -> None:
     print(f"re-judging one gate: {outcome.duration_s:.2f} s")
 
 
+@pytest.mark.long
 def test_a_threshold_within_the_same_verdict_judges_again_and_trains_nothing(copy: Path) -> None:
     evidence = [f"artifacts/{name}" for name in EVIDENCE]
     before = hashes(copy, *evidence)
