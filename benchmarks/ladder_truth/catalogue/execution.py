@@ -146,8 +146,9 @@ WRONGS = (
     Wrong("peeking_selector", "selection",
           "The selector is told which candidates the layers will take, and proposes these first.",
           "small", all_of(PEEKS, SHOWN),
-          Expected("D", refusal=r"candidate \d+ is (up to|drawn as) .* "
-                                r"required what [0-9a-f]{16}… draws"),
+          Expected("D", refusal=r"is another chunk than was drawn by invocation \d+|"
+                                r"candidate \d+ is (up to|drawn as) .* required what "
+                                r"[0-9a-f]{16}… draws"),
           note="Added with the import contract of the selector, which no ladder runs."),
     Wrong("judged_where_it_was_shown", "selection",
           "The comparison begins where the demonstrations began, so that all was seen in training.",
