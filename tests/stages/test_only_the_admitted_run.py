@@ -130,13 +130,11 @@ def test_stress_rolls_out_every_trained_seed_by_the_same_plan(
     planned, written = [], []
     without(
         monkeypatch, stress, "require_one_contract", "require_pinned_limits", "load_task",
-        "Comparison",
+        "Comparison", "require_unseen",
     )  # fmt: skip
     models = object()
     monkeypatch.setattr(stress, "latency_models", lambda *_: models)
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
-    unseen = []
-    monkeypatch.setattr(stress, "require_unseen", lambda dataset, starts: unseen.append(dataset))
     monkeypatch.setattr(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )
@@ -186,11 +184,9 @@ def test_in_blocks_the_first_training_says_how_far_the_others_run(
     params.raw["stress"] |= {"starts": 6, "block": 2}
     without(
         monkeypatch, stress, "require_one_contract", "require_pinned_limits", "load_task",
-        "Comparison", "latency_models",
+        "Comparison", "latency_models", "require_unseen",
     )  # fmt: skip
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
-    unseen = []
-    monkeypatch.setattr(stress, "require_unseen", lambda dataset, starts: unseen.append(dataset))
     monkeypatch.setattr(
         stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
     )
